@@ -60,8 +60,23 @@ FeatureTracker::FeatureTracker(const Calibration& theta,
     camera.px_per_rad = PixelsPerRadian(c).mean();
     camera.line_delay_s =
         j < options.line_delays_s.size() ? options.line_delays_s[j] : 0;
+    canvas_.width = std::max(canvas_.width, c.width_px);
+    canvas_.height = std::max(canvas_.height, c.height_px);
     cameras_.push_back(std::move(camera));
   }
+}
+
+Pyramid FeatureTracker::PyramidOf(const cv::Mat& image) const {
+  if (image.size() == canvas_) return BuildPyramid(image, options_.flow);
+  cv::Mat padded;
+  cv::copyMakeBorder(image,
+                     padded,
+                     0,
+                     canvas_.height - image.rows,
+                     0,
+                     canvas_.width - image.cols,
+                     cv::BORDER_REPLICATE);
+  return BuildPyramid(padded, options_.flow);
 }
 
 std::vector<TrackPoint> FeatureTracker::Track(
@@ -176,7 +191,7 @@ bool FeatureTracker::Align(const cv::Mat& smooth,
 
 void FeatureTracker::Follow(int camera, const cv::Mat& image, double t_s) {
   Camera& c = cameras_[static_cast<std::size_t>(camera)];
-  Pyramid next = BuildPyramid(image, options_.flow);
+  Pyramid next = PyramidOf(image);
   cv::Mat smooth;
   cv::GaussianBlur(image, smooth, {0, 0}, kSmoothing_px);
   std::vector<cv::Point2f> before;
@@ -195,7 +210,7 @@ void FeatureTracker::Follow(int camera, const cv::Mat& image, double t_s) {
     if (std::abs(ratio - 1) > kBrightnessTolerance) {
       cv::Mat scaled;
       c.image.convertTo(scaled, CV_8U, ratio);
-      c.pyramid = BuildPyramid(scaled, options_.flow);
+      c.pyramid = PyramidOf(scaled);
     }
     std::vector<char> kept =
         FollowPatches(c.pyramid, next, before, options_.flow, &found);

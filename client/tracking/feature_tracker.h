@@ -108,6 +108,9 @@ class FeatureTracker {
     std::vector<Point> points;
   };
 
+  // A pyramid on the canvas: only those of one size can be compared.
+  Pyramid PyramidOf(const cv::Mat& image) const;
+
   // A pixel of the last image of a camera, seen by another one, or by itself at
   // another time; at infinity unless a distance is given.
   std::optional<Eigen::Vector2d> Transfer(
@@ -147,6 +150,7 @@ class FeatureTracker {
   TrackerOptions options_;
   GyroRotation gyro_;
   std::vector<Camera> cameras_;
+  cv::Size canvas_;  // that all images fit into
   int images_ = 0;
   std::uint64_t next_landmark_ = 1;
   TrackingCounts counts_;

@@ -1,0 +1,86 @@
+#include "client/recording/png_image.h"
+
+#include <absl/status/status.h>
+#include <fmt/format.h>
+#include <png.h>
+
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+
+namespace selfcal::client {
+namespace {
+
+// libpng is C: its errors may pass its frames as exceptions only because they
+// are compiled with unwind tables, as Debian's are on all of its machines.
+[[noreturn]] void ThrowError(png_structp /*png*/, png_const_charp message) {
+  throw std::runtime_error(message);
+}
+
+void IgnoreWarning(png_structp /*png*/, png_const_charp /*message*/) {}
+
+class Decoder {
+ public:
+  explicit Decoder(std::FILE* file) {
+    png_ = png_create_read_struct(
+        PNG_LIBPNG_VER_STRING, nullptr, ThrowError, IgnoreWarning);
+    if (png_ != nullptr) info_ = png_create_info_struct(png_);
+    if (info_ == nullptr) throw std::runtime_error("no memory");
+    png_set_user_limits(png_, kMaxImageSide_px, kMaxImageSide_px);
+    png_init_io(png_, file);
+  }
+  ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+
+  GreyPixels Decode() {
+    png_read_info(png_, info_);
+    const int colour = png_get_color_type(png_, info_);
+    png_set_expand(png_);
+    png_set_scale_16(png_);
+    if ((colour & PNG_COLOR_MASK_COLOR) != 0) {
+      png_set_rgb_to_gray_fixed(
+          png_, PNG_ERROR_ACTION_NONE, PNG_RGB_TO_GRAY_DEFAULT, 0);
+    }
+    png_set_strip_alpha(png_);
+    png_set_interlace_handling(png_);
+    png_read_update_info(png_, info_);
+    GreyPixels image;
+    image.width_px = static_cast<int>(png_get_image_width(png_, info_));
+    image.height_px = static_cast<int>(png_get_image_height(png_, info_));
+    const auto width = static_cast<std::size_t>(image.width_px);
+    if (png_get_rowbytes(png_, info_) != width) {
+      throw std::runtime_error("pixels that are not grey");
+    }
+    image.pixels.resize(width * static_cast<std::size_t>(image.height_px));
+    std::vector<png_bytep> rows;
+    for (int v = 0; v < image.height_px; ++v) {
+      rows.push_back(image.pixels.data() + static_cast<std::size_t>(v) * width);
+    }
+    png_read_image(png_, rows.data());
+    png_read_end(png_, nullptr);
+    return image;
+  }
+
+ private:
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+};
+
+}  // namespace
+
+absl::StatusOr<GreyPixels> ReadPng(const std::string& path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
+      std::fopen(path.c_str(), "rb"), std::fclose);
+  if (!file) {
+    return absl::NotFoundError(fmt::format("{}: cannot be opened", path));
+  }
+  try {
+    return Decoder(file.get()).Decode();
+  } catch (const std::exception& e) {
+    return absl::DataLossError(
+        fmt::format("{}: not a whole PNG: {}", path, e.what()));
+  }
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,104 @@
+#include "client/recording/sensor_yaml.h"
+
+#include <absl/status/status.h>
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "core/model/camera_model.h"
+
+namespace selfcal::client {
+namespace {
+
+constexpr double kRotationTolerance = 1e-3;
+
+// All of these throw std::runtime_error with the key.
+std::vector<double> Numbers(const YAML::Node& node,
+                            const std::string& key,
+                            std::size_t size) {
+  std::vector<double> numbers;
+  try {
+    numbers = node.as<std::vector<double>>();
+  } catch (const YAML::Exception&) {
+    throw std::runtime_error(key + " is not a list of numbers");
+  }
+  if (numbers.size() != size) {
+    throw std::runtime_error(fmt::format(
+        "{} has {} numbers instead of {}", key, numbers.size(), size));
+  }
+  for (const double number : numbers) {
+    if (!std::isfinite(number)) {
+      throw std::runtime_error(key + " has a number that is not finite");
+    }
+  }
+  return numbers;
+}
+
+DistortionModel ModelNamed(const std::string& name) {
+  for (const DistortionModel model : DistortionModels()) {
+    if (DistortionName(model) == name) return model;
+  }
+  throw std::runtime_error("distortion_model '" + name + "' is not known");
+}
+
+CameraCalibration Parse(const YAML::Node& yaml) {
+  CameraCalibration camera;
+  const auto T_BS = Numbers(yaml["T_BS"]["data"], "T_BS", 16);
+  Eigen::Matrix3d R_IC;
+  Eigen::Vector3d p_IC;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) R_IC(i, j) = T_BS[4 * i + j];
+    p_IC[i] = T_BS[4 * i + 3];
+  }
+  const double off =
+      (R_IC * R_IC.transpose() - Eigen::Matrix3d::Identity()).norm();
+  if (off > kRotationTolerance || R_IC.determinant() < 0) {
+    throw std::runtime_error("T_BS is not a rotation with a translation");
+  }
+  camera.q_CI = Eigen::Quaterniond(R_IC).normalized().conjugate();
+  camera.p_CI = -(camera.q_CI * p_IC);
+  const auto f_c = Numbers(yaml["intrinsics"], "intrinsics", 4);
+  camera.f = {f_c[0], f_c[1]};
+  camera.c = {f_c[2], f_c[3]};
+  const auto size = Numbers(yaml["resolution"], "resolution", 2);
+  camera.width_px = static_cast<int>(size[0]);
+  camera.height_px = static_cast<int>(size[1]);
+  if (camera.width_px < 1 || camera.height_px < 1) {
+    throw std::runtime_error("resolution is not positive");
+  }
+  camera.model = ModelNamed(yaml["distortion_model"].as<std::string>(""));
+  const auto k =
+      Numbers(yaml["distortion_coefficients"],
+              "distortion_coefficients",
+              static_cast<std::size_t>(DistortionSize(camera.model)));
+  camera.distortion = Eigen::Map<const Eigen::VectorXd>(
+      k.data(), static_cast<Eigen::Index>(k.size()));
+  camera.time_offset_s = yaml["time_offset_s"].as<double>(0);
+  return camera;
+}
+
+}  // namespace
+
+absl::StatusOr<CameraCalibration> ParseCameraYaml(const std::string& text) {
+  // OpenCV's header is no directive of YAML.
+  const std::size_t begin =
+      text.starts_with("%YAML:") ? text.find('\n') : std::size_t{0};
+  if (begin == std::string::npos) {
+    return absl::InvalidArgumentError("there is nothing but a header");
+  }
+  try {
+    const YAML::Node yaml = YAML::Load(text.substr(begin));
+    if (!yaml.IsMap()) return absl::InvalidArgumentError("is not a map");
+    return Parse(yaml);
+  } catch (const std::exception& e) {
+    return absl::InvalidArgumentError(e.what());
+  }
+}
+
+}  // namespace selfcal::client
