@@ -24,7 +24,7 @@ struct CoupledCase {
   double g_sensitivity = 0;  // [rad/s per m/s^2]
   double position_m = 0;
   int positions = 0;
-  std::vector<std::string> fixed;  // at its true value
+  std::vector<std::string> fixed = {};  // at its true value
 };
 
 // The position of an accelerometer and those of the cameras are relative to the

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "core/model/rig.h"
 #include "core/model/so3.h"
 #include "test/core/model/random_values.h"
 
@@ -146,6 +147,65 @@ TEST(Calibration, ABlockThatACameraLacksHasNoComponents) {
   const auto violations = Validate(theta, "");
   ASSERT_EQ(violations.size(), 1u);
   EXPECT_EQ(violations[0].field, "cameras[1].line_delay_s");
+}
+
+Calibration Coupled(int positions, RandomValues* random) {
+  Calibration theta = random->Theta();
+  theta.imu.gyro_g_sensitivity = random->Vector(9, 1e-3);
+  theta.imu.accel_position = random->Vector(positions, 0.1);
+  return theta;
+}
+
+TEST(OptionalBlocks, OfAnImuAreComponentsWhereItHasThem) {
+  RandomValues random(13);
+  const Calibration plain = random.Theta();
+  EXPECT_EQ(ImuTangentSize(plain.imu), 15);
+  for (const int positions : {0, 3, 9}) {
+    const Calibration theta = Coupled(positions, &random);
+    EXPECT_EQ(ImuTangentSize(theta.imu), 15 + 9 + positions);
+    EXPECT_EQ(CameraTangentOffset(theta, 0), 15 + 9 + positions);
+    EXPECT_EQ(TangentSize(theta), TangentSize(plain) + 9 + positions);
+    EXPECT_FALSE(SameShape(theta, plain));
+    const auto components = TangentComponents(theta);
+    EXPECT_EQ(components[15].name, "imu.gyro.g_sensitivity.x.x");
+    EXPECT_EQ(components[16].name, "imu.gyro.g_sensitivity.x.y");
+    EXPECT_EQ(components[23].name, "imu.gyro.g_sensitivity.z.z");
+    EXPECT_EQ(components[24].name,
+              positions == 0   ? "cam0.q_CI.x"
+              : positions == 3 ? "imu.accel.position.x"
+                               : "imu.accel.position.x.x");
+    const Eigen::VectorXd delta = random.Vector(TangentSize(theta), 0.1);
+    const Calibration moved = BoxPlus(theta, delta);
+    EXPECT_LT((BoxMinus(moved, theta) - delta).norm(), 1e-12);
+    const Eigen::Matrix3d more = moved.imu.T_s() - theta.imu.T_s();
+    EXPECT_NEAR(more(0, 1), delta[16], 1e-15);
+    EXPECT_NEAR(more(1, 0), delta[18], 1e-15);
+    for (int j = 0; j < 3 && positions > 0; ++j) {
+      const Eigen::Vector3d shift =
+          moved.imu.AccelPositions().col(j) - theta.imu.AccelPositions().col(j);
+      const int at = 24 + (positions == 9 ? 3 * j : 0);
+      EXPECT_LT((shift - delta.segment<3>(at)).norm(), 1e-15);
+    }
+  }
+}
+
+TEST(OptionalBlocks, HaveOneOfTheirSizes) {
+  RandomValues random(14);
+  Calibration theta = Coupled(3, &random);
+  EXPECT_TRUE(Validate(theta, "").empty());
+  theta.imu.gyro_g_sensitivity.resize(3);
+  theta.imu.accel_position = random.Vector(6, 0.1);
+  auto violations = Validate(theta, "");
+  ASSERT_EQ(violations.size(), 2u);
+  EXPECT_EQ(violations[0].field, "imu.gyro_g_sensitivity");
+  EXPECT_EQ(violations[0].message, "has 3 values; it may have 0 or 9");
+  EXPECT_EQ(violations[1].field, "imu.accel_position");
+  EXPECT_EQ(violations[1].message, "has 6 values; it may have 0, 3 or 9");
+  theta = Coupled(9, &random);
+  theta.imu.accel_position[4] = 20;
+  violations = Validate(theta, "");
+  ASSERT_EQ(violations.size(), 1u);
+  EXPECT_EQ(violations[0].field, "imu.accel_position");
 }
 
 TEST(TangentComponents, AreAsManyAsTheTangentHasDimensions) {

@@ -13,8 +13,10 @@
 namespace selfcal {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
+using testing::Not;
 
 Rig RandomRig() {
   RandomValues random(1);
@@ -171,6 +173,23 @@ TEST(Blocks, AreEstimatedAsTheLastSettingThatMatchesStates) {
   EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(0, 0, 1));
   rig.fixed = {"imu.accel.misalignment.*"};
   EXPECT_THAT(FreeBlocks(rig), ElementsAre("cam2.time_offset"));
+}
+
+TEST(Blocks, OfAnImuAreAddedWhereASettingEstimatesThem) {
+  Rig rig = RandomRig();
+  rig.blocks = {{"imu.gyro.*", true}, {"imu.accel.position", false}};
+  AddEstimatedBlocks(rig.blocks, &rig.factory);
+  EXPECT_EQ(rig.factory.imu.gyro_g_sensitivity, Eigen::VectorXd::Zero(9));
+  EXPECT_EQ(rig.factory.imu.accel_position.size(), 0);
+  rig.blocks = {{"imu.accel.position", true}};
+  AddEstimatedBlocks(rig.blocks, &rig.factory);
+  EXPECT_EQ(rig.factory.imu.accel_position, Eigen::VectorXd::Zero(9));
+  // Both are there; one is estimated.
+  EXPECT_THAT(FreeBlocks(rig), Contains("imu.accel.position"));
+  EXPECT_THAT(FreeBlocks(rig), Not(Contains("imu.gyro.g_sensitivity")));
+  rig.factory.imu.accel_position = Eigen::Vector3d(1, 2, 3);
+  AddEstimatedBlocks(rig.blocks, &rig.factory);
+  EXPECT_EQ(rig.factory.imu.accel_position, Eigen::Vector3d(1, 2, 3));
 }
 
 TEST(DefaultGroups, LeaveOutWhatHasNoEstimatedBlock) {
