@@ -73,6 +73,12 @@ selfcal_imu ToImu(const ImuCalibration& given) {
   Copy(given.s_a, imu.accel_scale);
   Copy(given.m_a, imu.accel_misalignment);
   imu.q_AI = ToQuaternion(given.q_AI);
+  imu.gyro_g_sensitivity_size =
+      static_cast<std::int32_t>(given.gyro_g_sensitivity.size());
+  imu.accel_position_size =
+      static_cast<std::int32_t>(given.accel_position.size());
+  Copy(given.gyro_g_sensitivity, imu.gyro_g_sensitivity);
+  Copy(given.accel_position, imu.accel_position);
   return imu;
 }
 
@@ -99,6 +105,20 @@ Eigen::Quaterniond FromQuaternion(const selfcal_quaternion& q) {
   return {q.w, q.x, q.y, q.z};
 }
 
+// Reads an optional block; INVALID_ARGUMENT for a size that does not fit.
+// Validate() checks the others.
+absl::Status FromOptional(const std::string& name,
+                          std::int32_t size,
+                          const double (&values)[kMaxOptionalSize],
+                          OptionalVector* block) {
+  if (size < 0 || size > kMaxOptionalSize) {
+    return absl::InvalidArgumentError(fmt::format(
+        "{}: is {}, must be 0 to {}", name, size, kMaxOptionalSize));
+  }
+  *block = Eigen::Map<const Eigen::VectorXd>(values, size);
+  return absl::OkStatus();
+}
+
 // INVALID_ARGUMENT for a struct of the wrong size.
 absl::Status FromImu(const selfcal_imu* given, ImuCalibration* imu) {
   selfcal_imu read;
@@ -109,7 +129,15 @@ absl::Status FromImu(const selfcal_imu* given, ImuCalibration* imu) {
   imu->s_a = Eigen::Vector3d(read.accel_scale);
   imu->m_a = Eigen::Vector3d(read.accel_misalignment);
   imu->q_AI = FromQuaternion(read.q_AI);
-  return status;
+  status = FromOptional("imu.gyro_g_sensitivity_size",
+                        read.gyro_g_sensitivity_size,
+                        read.gyro_g_sensitivity,
+                        &imu->gyro_g_sensitivity);
+  if (!status.ok()) return status;
+  return FromOptional("imu.accel_position_size",
+                      read.accel_position_size,
+                      read.accel_position,
+                      &imu->accel_position);
 }
 
 // INVALID_ARGUMENT for a struct of the wrong size, and for a model that is not

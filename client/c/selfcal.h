@@ -424,10 +424,11 @@ int32_t selfcal_stream_spool_status(const selfcal_stream* stream,
 
 // --------------------------------------------------------------- Calibration
 
-// The gyroscope reads T_g w + b_g, the accelerometer T_a R_AI f_I + b_a, where
-// R_AI is the rotation of q_AI. T_g and T_a are upper triangular, with the
-// scales on the diagonal and the misalignments (x, y, z) at (0,1), (0,2),
-// (1,2).
+// The gyroscope reads T_g w + T_s f + b_g, the accelerometer T_a R_AI f + b_a,
+// where R_AI is the rotation of q_AI. T_g and T_a are upper triangular, with
+// the scales on the diagonal and the misalignments (x, y, z) at (0,1), (0,2),
+// (1,2). f is the specific force at the accelerometer, of which each axis may
+// have a position r of its own: f_I + w x (w x r) + dw/dt x r.
 typedef struct selfcal_imu {
   uint32_t struct_size;
   uint32_t reserved;
@@ -435,7 +436,11 @@ typedef struct selfcal_imu {
   double gyro_misalignment[3];
   double accel_scale[3];
   double accel_misalignment[3];
-  selfcal_quaternion q_AI;  // rotates from I to A
+  selfcal_quaternion q_AI;          // rotates from I to A
+  int32_t gyro_g_sensitivity_size;  // 9, or 0: zero
+  int32_t accel_position_size;      // 3: of all axes, 9: of x, y, z, or 0: zero
+  double gyro_g_sensitivity[9];     // T_s, row by row [rad/s per m/s^2]
+  double accel_position[9];         // in I [m]
 } selfcal_imu;
 
 // Most coefficients that a distortion model has.
@@ -529,7 +534,8 @@ int32_t selfcal_calibration_get_covariance(
 
 // Corrects a pair of readings: angular rate w_I [rad/s] and specific force f_I
 // (acceleration minus gravity) [m/s^2], both in the body frame. b_g [rad/s, in
-// I] and b_a [m/s^2, in A] are the biases at that time.
+// I] and b_a [m/s^2, in A] are the biases at that time. With a position of the
+// accelerometer, dw/dt is taken as zero.
 int32_t selfcal_calibration_correct_imu(const selfcal_calibration* calibration,
                                         const double gyro[3],
                                         const double accel[3],

@@ -58,13 +58,26 @@ ImuInBody FromMatrices(const ImuMatrices& matrices) {
   result.imu.m_a = above(accel.triangular);
   result.imu.q_AI =
       Eigen::Quaterniond(accel.R * gyro.R.transpose()).normalized();
+  if (!matrices.G_f.isZero(0)) {
+    const Eigen::Matrix3d T_s = matrices.G_f * gyro.R.transpose();
+    result.imu.gyro_g_sensitivity = T_s.reshaped<Eigen::RowMajor>();
+  }
+  if (!matrices.r.isZero(0)) {
+    const Eigen::Matrix3d r_I = gyro.R * matrices.r;
+    const bool same = matrices.r.col(1) == matrices.r.col(0) &&
+                      matrices.r.col(2) == matrices.r.col(0);
+    result.imu.accel_position = r_I.reshaped().head(same ? 3 : 9);
+  }
   return result;
 }
 
 AccelFrame ToAccelFrame(const ImuCalibration& imu) {
   const Factors accel =
       LowerFactors(imu.T_a() * imu.q_AI.normalized().toRotationMatrix());
-  return {{.G = imu.T_g() * accel.R.transpose(), .A = accel.triangular},
+  return {{.G = imu.T_g() * accel.R.transpose(),
+           .A = accel.triangular,
+           .G_f = imu.T_s() * accel.R.transpose(),
+           .r = accel.R * imu.AccelPositions()},
           accel.R};
 }
 

@@ -23,13 +23,18 @@ struct Factors {
 Factors LowerFactors(const Eigen::Matrix3d& M);
 Factors UpperFactors(const Eigen::Matrix3d& M);
 
-// Readings in a body frame B: gyro = G w_B + b_g, accel = A f_B + b_a.
+// Readings in a body frame B: gyro = G w_B + G_f f_B + b_g and
+// accel = A f_B + b_a, with axis j of the accelerometer at the position r_j in
+// B. What is optional is zero where an IMU lacks it.
 struct ImuMatrices {
   Eigen::Matrix3d G;
   Eigen::Matrix3d A;
+  Eigen::Matrix3d G_f = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d r = Eigen::Matrix3d::Zero();  // columns r_x, r_y, r_z [m]
 };
 
-// The same IMU in selfcal's form, with the orientation of its frame I.
+// The same IMU in selfcal's form, with the orientation of its frame I; it has
+// the optional blocks that are not zero.
 struct ImuInBody {
   ImuCalibration imu;
   Eigen::Matrix3d R_IB;

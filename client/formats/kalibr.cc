@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "client/formats/camera_chain.h"
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
@@ -22,6 +24,30 @@ void CheckReference(const YAML::Node& imu) {
   }
 }
 
+// Keys of the positions of the axes in I.
+constexpr const char* kPositions[] = {"rx_i", "ry_i", "rz_i"};
+
+// Kalibr's positions are those of orthogonal axes, whose forces M mixes;
+// selfcal's are those of the axes that are read.
+void AddPositionsLoss(const std::string& name,
+                      const ImuMatrices& imu,
+                      std::vector<Loss>* losses) {
+  const Eigen::Matrix3d& r = imu.r;
+  const double distance_m =
+      std::max((r.col(1) - r.col(0)).norm(), (r.col(2) - r.col(0)).norm());
+  Eigen::Matrix3d mixed = imu.A;
+  mixed.diagonal().setZero();
+  const double part = mixed.cwiseAbs().maxCoeff();
+  if (distance_m * part == 0) return;
+  losses->push_back(
+      {name,
+       fmt::format("kalibr's axes of the accelerometer are orthogonal before M "
+                   "mixes them, those of selfcal are read: the positions of "
+                   "both differ by up to {:.1g} m",
+                   distance_m * part),
+       true});
+}
+
 // Reads the IMU's matrices; without them, readings are used as they are. A
 // result of the model "calibrated" repeats those of its input, unused.
 ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
@@ -34,18 +60,14 @@ ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
   const YAML::Node accel = Get(imu, "accelerometers");
   result.G = GetMatrix(gyro, "M", 3, 3) * GetMatrix(gyro, "C_gyro_i", 3, 3);
   result.A = GetMatrix(accel, "M", 3, 3);
-  if (Has(gyro, "A") && !GetMatrix(gyro, "A", 3, 3).isZero(0)) {
-    losses->push_back({"gyroscopes.A",
-                       "selfcal has no sensitivity of the gyroscope to "
-                       "acceleration: ignored",
-                       true});
+  if (Has(gyro, "A")) {
+    result.G_f = GetMatrix(gyro, "A", 3, 3) * GetMatrix(gyro, "C_gyro_i", 3, 3);
   }
-  for (const char* arm : {"rx_i", "ry_i", "rz_i"}) {
-    if (!Has(accel, arm) || GetMatrix(accel, arm, 3, 1).isZero(0)) continue;
-    losses->push_back({fmt::format("accelerometers.{}", arm),
-                       "selfcal has one position for all axes: ignored",
-                       true});
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!Has(accel, kPositions[axis])) continue;
+    result.r.col(axis) = GetMatrix(accel, kPositions[axis], 3, 1);
   }
+  AddPositionsLoss("accelerometers.M", result, losses);
   return result;
 }
 
@@ -77,10 +99,10 @@ void AddMatricesLoss(const ImuCalibration& imu, std::vector<Loss>* losses) {
   if (IsNominal(imu)) return;
   losses->push_back(
       {"imu_matrices",
-       "kalibr writes accelerometers.M, gyroscopes.M and C_gyro_i, but does "
-       "not "
-       "read them: as its input, imu.yaml states the noise alone, and "
-       "--imu-models scale-misalignment estimates them from the identity",
+       "kalibr writes accelerometers.M, gyroscopes.M and C_gyro_i, A and "
+       "positions, but does not read them: as its input, imu.yaml states the "
+       "noise alone, and --imu-models scale-misalignment (-size-effect) "
+       "estimates them from the identity",
        false});
 }
 
@@ -138,16 +160,27 @@ ExportedFiles ExportKalibr(const Rig& rig,
     before = T_CB;
   }
   const Factors gyro = LowerFactors(body.matrices.G);
+  std::string positions;
+  if (theta.imu.accel_position.size() > 0) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3d r = body.matrices.r.col(axis);
+      positions +=
+          fmt::format("  {}: {}\n", kPositions[axis], ListText({r.data(), 3}));
+    }
+    AddPositionsLoss("imu.accel.position", body.matrices, &result.losses);
+  }
   const std::string imu = fmt::format(
       "{}"
-      "model: scale-misalignment\n"
-      "accelerometers:\n  M:\n{}"
+      "model: scale-misalignment{}\n"
+      "accelerometers:\n  M:\n{}{}"
       "gyroscopes:\n  M:\n{}  A:\n{}  C_gyro_i:\n{}",
       ChainNoiseText(
           rig.imu_noise, ImuRate(options, "update_rate", &result.losses), ""),
+      positions.empty() ? "" : "-size-effect",
       RowsText(body.matrices.A, "  "),
+      positions,
       RowsText(gyro.triangular, "  "),
-      RowsText(Eigen::Matrix3d::Zero(), "  "),
+      RowsText(body.matrices.G_f * gyro.R.transpose(), "  "),
       RowsText(gyro.R, "  "));
   AddMatricesLoss(theta.imu, &result.losses);
   AddGravityLoss("kalibr", rig, &result.losses);

@@ -5,10 +5,11 @@
 // t_imu = t_cam + timeshift_cam_imu. The IMU's frame is that in which the
 // accelerometer's matrix is lower triangular:
 //   accel = M_a f + b_a,   gyro = M_g C_gyro_i w + A_g C_gyro_i f + b_g,
-// with M_g lower triangular, too. The format can express everything that
-// selfcal has but for radial-tangential models of more than 4 coefficients; yet
-// Kalibr reads no matrices. Reading ignores A_g, the gyroscope's sensitivity to
-// acceleration, and the lever arms of the accelerometer's axes.
+// with M_g lower triangular, too; A_g is the gyroscope's sensitivity to
+// acceleration, of which f is that at the origin. The axes of the accelerometer
+// are at rx_i, ry_i and rz_i, before M_a mixes them. The format can express
+// everything that selfcal has but for radial-tangential models of more than 4
+// coefficients; yet Kalibr reads no matrices.
 #pragma once
 
 #include <vector>

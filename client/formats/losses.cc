@@ -26,6 +26,29 @@ void AddImuLoss(const std::string& tool,
        true});
 }
 
+void AddGSensitivityLoss(const std::string& tool,
+                         const ImuCalibration& imu,
+                         std::vector<Loss>* losses) {
+  if (imu.gyro_g_sensitivity.isZero(0)) return;
+  losses->push_back({"imu.gyro.g_sensitivity",
+                     fmt::format("{} has no sensitivity of the gyroscope to "
+                                 "acceleration: omitted",
+                                 tool),
+                     true});
+}
+
+void AddPositionLoss(const std::string& tool,
+                     const ImuCalibration& imu,
+                     std::vector<Loss>* losses) {
+  if (imu.accel_position.isZero(0)) return;
+  losses->push_back(
+      {"imu.accel.position",
+       fmt::format("{} has the accelerometer at the origin of the "
+                   "IMU: omitted",
+                   tool),
+       true});
+}
+
 void AddTimeOffsetLosses(const std::string& tool,
                          const Calibration& theta,
                          std::vector<Loss>* losses) {

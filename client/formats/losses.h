@@ -18,6 +18,15 @@ void AddImuLoss(const std::string& tool,
                 const ImuCalibration& imu,
                 std::vector<Loss>* losses);
 
+// For tools that correct readings, but not by these blocks: a loss unless they
+// are absent or zero.
+void AddGSensitivityLoss(const std::string& tool,
+                         const ImuCalibration& imu,
+                         std::vector<Loss>* losses);
+void AddPositionLoss(const std::string& tool,
+                     const ImuCalibration& imu,
+                     std::vector<Loss>* losses);
+
 // For tools without time offsets.
 void AddTimeOffsetLosses(const std::string& tool,
                          const Calibration& theta,

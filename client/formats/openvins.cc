@@ -36,7 +36,7 @@ Eigen::Matrix3d ReadRotation(const YAML::Node& imu, const std::string& key) {
   return Rigid(T, key).topLeftCorner<3, 3>();
 }
 
-ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
+ImuMatrices ReadMatrices(const YAML::Node& imu) {
   const std::string model =
       Has(imu, "model") ? GetText(imu, "model") : "calibrated";
   if (model != "rpng" && model != "kalibr" && model != "calibrated") {
@@ -44,15 +44,11 @@ ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
         fmt::format("model '{}' is not calibrated, kalibr or rpng", model));
   }
   const bool upper = model == "rpng";
-  if (Has(imu, "Tg") && !GetMatrix(imu, "Tg", 3, 3).isZero(0)) {
-    losses->push_back({"Tg",
-                       "selfcal has no sensitivity of the gyroscope to "
-                       "acceleration: ignored",
-                       true});
-  }
-  return {
+  ImuMatrices result = {
       .G = ReadTriangle(imu, "Tw", upper) * ReadRotation(imu, "R_IMUtoGYRO"),
       .A = ReadTriangle(imu, "Ta", upper) * ReadRotation(imu, "R_IMUtoACC")};
+  if (Has(imu, "Tg")) result.G_f = GetMatrix(imu, "Tg", 3, 3);
+  return result;
 }
 
 Eigen::Matrix4d ReadExtrinsics(const YAML::Node& node) {
@@ -69,7 +65,7 @@ ImportedRig ImportOpenVins(const std::vector<TextFile>& files,
   const ChainFiles chain = ReadChainFiles(files);
   ImportedRig result;
   result.rig.imu_noise = ReadChainNoise(chain.imu);
-  const ImuInBody body = FromMatrices(ReadMatrices(chain.imu, &result.losses));
+  const ImuInBody body = FromMatrices(ReadMatrices(chain.imu));
   result.rig.factory.imu = body.imu;
   for (int j = 0; Has(chain.cameras, fmt::format("cam{}", j)); ++j) {
     const YAML::Node node = chain.cameras[fmt::format("cam{}", j)];
@@ -129,7 +125,8 @@ ExportedFiles ExportOpenVins(const Rig& rig,
       RowsText(Eigen::Matrix3d::Identity(), "    "),
       RowsText(theta.imu.T_a(), "    "),
       RowsText(theta.imu.q_AI.normalized().toRotationMatrix(), "    "),
-      RowsText(Eigen::Matrix3d::Zero(), "    "));
+      RowsText(theta.imu.T_s(), "    "));
+  AddPositionLoss("openvins", theta.imu, &result.losses);
   AddSharedOffsetLosses("openvins", theta, &result.losses);
   AddLineDelayLosses("openvins", theta, &result.losses);
   AddGravityLoss("openvins", rig, &result.losses);

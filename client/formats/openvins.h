@@ -5,7 +5,7 @@
 // offset of cam0 applies to all cameras. The matrices are those of the
 // readings,
 //   accel = Ta R_IMUtoACC f + b_a,
-//   gyro  = Tw R_IMUtoGYRO w + Tg f + b_g;
+//   gyro  = Tw R_IMUtoGYRO w + Tg f + b_g, f the force that accel reads;
 // of their inverses, OpenVINS uses the upper triangle with the model "rpng" and
 // the lower triangle with "kalibr". The model is written as "rpng" with
 // R_IMUtoGYRO = 1, which is selfcal's own form.

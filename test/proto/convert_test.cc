@@ -37,6 +37,8 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
   EXPECT_TRUE(SameBits(a.imu.s_a, b.imu.s_a));
   EXPECT_TRUE(SameBits(a.imu.m_a, b.imu.m_a));
   EXPECT_TRUE(SameBits(a.imu.q_AI, b.imu.q_AI));
+  EXPECT_TRUE(SameBits(a.imu.gyro_g_sensitivity, b.imu.gyro_g_sensitivity));
+  EXPECT_TRUE(SameBits(a.imu.accel_position, b.imu.accel_position));
   ASSERT_EQ(a.cameras.size(), b.cameras.size());
   for (std::size_t j = 0; j < a.cameras.size(); ++j) {
     const CameraCalibration& x = a.cameras[j];

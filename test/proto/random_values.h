@@ -62,9 +62,21 @@ class RandomValues {
     return camera;
   }
 
+  OptionalVector Optional(int size) {
+    OptionalVector value(size);
+    for (double& x : value) x = Double();
+    return value;
+  }
+
   Calibration Theta() {
     Calibration theta;
-    theta.imu = {Vector3(), Vector3(), Vector3(), Vector3(), Quaternion()};
+    theta.imu = {Vector3(),
+                 Vector3(),
+                 Vector3(),
+                 Vector3(),
+                 Quaternion(),
+                 Optional(9 * Int(0, 1)),
+                 Optional(3 * Int(0, 3))};
     for (int i = Int(0, 4); i > 0; --i) theta.cameras.push_back(Camera());
     return theta;
   }

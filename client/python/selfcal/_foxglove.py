@@ -264,4 +264,14 @@ def losses(calibration: v1.CalibrationParameters) -> list[str]:
         lost.append(
             "imu: scales and misalignments are not included; readings are raw"
         )
+    if any(scales.gyro_g_sensitivity):
+        lost.append(
+            "imu: the sensitivity of the gyroscope to acceleration is not "
+            "included; readings are raw"
+        )
+    if any(scales.accel_position):
+        lost.append(
+            "imu: the position of the accelerometer is not included; its "
+            "readings are those of its own place"
+        )
     return lost

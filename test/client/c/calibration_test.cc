@@ -259,6 +259,31 @@ TEST_F(CalibrationTest, CanBeMadeOfTheSameValues) {
   }
   selfcal_calibration_destroy(made);
 
+  // With the optional parts of an IMU.
+  imu.gyro_g_sensitivity_size = 9;
+  imu.gyro_g_sensitivity[5] = 2e-4;
+  imu.accel_position_size = 3;
+  imu.accel_position[1] = 0.03;
+  ASSERT_EQ(selfcal_calibration_create(&imu, pointers, 2, &made, &error_), 0)
+      << error_.message;
+  EXPECT_EQ(selfcal_calibration_component_count(made), size + 9 + 3);
+  selfcal_imu again = {};
+  again.struct_size = sizeof(again);
+  ASSERT_EQ(selfcal_calibration_get_imu(made, &again, nullptr), 0);
+  EXPECT_EQ(again.gyro_g_sensitivity[5], 2e-4);
+  EXPECT_EQ(again.accel_position_size, 3);
+  EXPECT_EQ(again.accel_position[1], 0.03);
+  selfcal_calibration_destroy(made);
+  imu.accel_position_size = 10;
+  EXPECT_EQ(selfcal_calibration_create(&imu, pointers, 2, &made, &error_),
+            SELFCAL_INVALID_ARGUMENT);
+  EXPECT_STREQ(error_.message,
+               "imu.accel_position_size: is 10, must be 0 to 9");
+  imu.accel_position_size = 4;
+  EXPECT_EQ(selfcal_calibration_create(&imu, pointers, 2, &made, &error_),
+            SELFCAL_INVALID_ARGUMENT);
+  imu.accel_position_size = 0;
+
   cameras[1].model = "pinhole";
   EXPECT_EQ(selfcal_calibration_create(&imu, pointers, 2, &made, &error_),
             SELFCAL_INVALID_ARGUMENT);

@@ -33,10 +33,11 @@ struct Expressible {
   const char* format;
   std::vector<Model> models;
   std::size_t cameras;
-  bool same_model;     // of all cameras
-  bool imu;            // its scales, misalignments, rotation
-  bool time_offset;    // any
-  bool time_offsets;   // one for each camera
+  bool same_model;    // of all cameras
+  bool imu;           // its scales, misalignments, rotation
+  bool time_offset;   // any
+  bool time_offsets;  // one for each camera
+  bool g_sensitivity = false;
   double least_w = 0;  // of a FOV camera, in magnitude
   bool poses = true;   // of cameras
   bool noise = true;   // of the IMU
@@ -60,6 +61,7 @@ const Expressible kExpressible[] = {
      false,
      true,
      true,
+     true,
      true},
     {"openvins",
      {Model::kRadialTangential, Model::kEquidistant},
@@ -67,7 +69,8 @@ const Expressible kExpressible[] = {
      false,
      true,
      true,
-     false},
+     false,
+     true},
     {"orb_slam3",
      {Model::kRadialTangential, kRadialTangential5, Model::kEquidistant},
      2,
@@ -105,6 +108,7 @@ const Expressible kExpressible[] = {
      false,
      false,
      false,
+     false,
      0.5},
     {"camera_info",
      {Model::kRadialTangential,
@@ -112,6 +116,7 @@ const Expressible kExpressible[] = {
       kRadialTangential8,
       Model::kEquidistant},
      4,
+     false,
      false,
      false,
      false,
@@ -146,6 +151,9 @@ Rig RandomRig(const Expressible& format, RandomValues* random) {
                      .accel_noise_density = random->Uniform(1e-3, 1e-2),
                      .gyro_bias_random_walk = random->Uniform(1e-6, 1e-4),
                      .accel_bias_random_walk = random->Uniform(1e-5, 1e-3)};
+  }
+  if (format.g_sensitivity) {
+    rig.factory.imu.gyro_g_sensitivity = random->Vector(9, 1e-3);
   }
   const std::size_t cameras = 1 + Pick(format.cameras, random);
   const Model model = format.models[Pick(format.models.size(), random)];
@@ -267,6 +275,54 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
               loss.name == "imu" || loss.name.rfind("cam", 0) == 0)
         << loss.name;
   }
+}
+
+TEST_P(Export, OptionalBlocksOfTheImuAreWrittenOrNamed) {
+  RandomValues random(20);
+  Rig rig = RandomRig(GetParam(), &random);
+  const std::string format = GetParam().format;
+  const auto count = [&](const std::string& name) {
+    const auto files = ExportRig(format, rig, rig.factory, kOptions);
+    EXPECT_TRUE(files.ok()) << files.status();
+    const std::vector<std::string> names = Names(files->losses);
+    return std::count(names.begin(), names.end(), name);
+  };
+  rig.factory.imu.gyro_g_sensitivity = random.Vector(9, 1e-3);
+  rig.factory.imu.accel_position = random.Vector(3, 0.05);
+  if (!GetParam().imu) {
+    rig.factory.imu.s_g = rig.factory.imu.s_a = Eigen::Vector3d::Ones();
+    rig.factory.imu.m_g = rig.factory.imu.m_a = Eigen::Vector3d::Zero();
+    rig.factory.imu.q_AI.setIdentity();
+    EXPECT_EQ(count("imu"), 1);
+    return;
+  }
+  EXPECT_EQ(count("imu.gyro.g_sensitivity"), !GetParam().g_sensitivity);
+  EXPECT_EQ(count("imu.accel.position"), format != "kalibr");
+}
+
+TEST(ExportKalibr, PositionsOfAxesReadBackAndAreSaidToBeInexact) {
+  RandomValues random(21);
+  Rig rig = RandomRig(kExpressible[0], &random);
+  rig.factory.imu.accel_position = random.Vector(9, 0.01);
+  const auto files = ExportRig("kalibr", rig, rig.factory, kOptions);
+  ASSERT_TRUE(files.ok()) << files.status();
+  EXPECT_THAT(Names(files->losses), Contains("imu.accel.position"));
+  EXPECT_THAT(LoaderFaults("kalibr", files->files), IsEmpty());
+  const auto again = ImportRig("kalibr", files->files, kOptions);
+  ASSERT_TRUE(again.ok()) << again.status();
+  ASSERT_TRUE(SameShape(again->rig.factory, rig.factory));
+  EXPECT_LT(BoxMinus(again->rig.factory, rig.factory)
+                .head(kMaxImuTangentSize)
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-9);
+  // The same of all axes is exact.
+  rig.factory.imu.gyro_g_sensitivity.resize(0);
+  rig.factory.imu.accel_position = random.Vector(3, 0.05);
+  const auto one = ExportRig("kalibr", rig, rig.factory, kOptions);
+  ASSERT_TRUE(one.ok()) << one.status();
+  ExpectSamePredictions(
+      rig.factory, ReadAsTool("kalibr", one->files, kRate_hz), &random);
 }
 
 TEST_P(Export, NothingIsLostOfANominalDevice) {

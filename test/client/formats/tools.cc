@@ -149,8 +149,24 @@ Tool Kalibr(const std::vector<TextFile>& files) {
   if (!Ma.isLowerTriangular() || !Mg.isLowerTriangular()) {
     throw std::runtime_error("Kalibr's matrices are lower triangular");
   }
+  const Matrix3d A = Mat<3>(imu["gyroscopes"]["A"]);
+  Matrix3d r = Matrix3d::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string key = std::string("r") + "xyz"[axis] + "_i";
+    if (const YAML::Node node = imu["accelerometers"][key]) {
+      for (int i = 0; i < 3; ++i) r(i, axis) = node[i].as<double>();
+    }
+  }
+  // At a constant rate. Its forces are at the origin, so that A is exact only
+  // where r is zero.
   tool.correct = [=](const Vector3d& gyro, const Vector3d& accel) -> ToolRates {
-    return {C.inverse() * (Mg.inverse() * gyro), Ma.inverse() * accel};
+    const Vector3d read = Ma.inverse() * accel;
+    const Vector3d w = C.inverse() * (Mg.inverse() * (gyro - A * (C * read)));
+    Vector3d f = read;
+    for (int axis = 0; axis < 3; ++axis) {
+      f[axis] -= w.cross(w.cross(r.col(axis)))[axis];
+    }
+    return {w, f};
   };
   tool.noise = {
       .gyro_noise_density = imu["gyroscope_noise_density"].as<double>(),
@@ -190,8 +206,10 @@ Tool OpenVins(const std::vector<TextFile>& files) {
   }
   const Matrix3d R_GYROtoIMU = Mat<3>(imu["R_IMUtoGYRO"]).transpose();
   const Matrix3d R_ACCtoIMU = Mat<3>(imu["R_IMUtoACC"]).transpose();
+  const Matrix3d Tg = Mat<3>(imu["Tg"]);
   tool.correct = [=](const Vector3d& gyro, const Vector3d& accel) -> ToolRates {
-    return {R_GYROtoIMU * Dw * gyro, R_ACCtoIMU * Da * accel};
+    const Vector3d f = R_ACCtoIMU * Da * accel;
+    return {R_GYROtoIMU * Dw * (gyro - Tg * f), f};
   };
   tool.noise = {
       .gyro_noise_density = imu["gyroscope_noise_density"].as<double>(),

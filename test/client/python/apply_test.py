@@ -54,7 +54,7 @@ class ApplyTest(unittest.TestCase):
                 cls.cameras[-1][1][what].append(values)
 
     def test_corrects_readings(self) -> None:
-        self.assertEqual(len(self.imus), 20)
+        self.assertEqual(len(self.imus), 40)
         for values in self.imus:
             parts = [np.array(values[i : i + 3]) for i in range(0, 12, 3)]
             w, x, y, z = values[12:16]
@@ -65,15 +65,23 @@ class ApplyTest(unittest.TestCase):
                 m_a=vector(parts[3]),
                 q_ai=v1.Quaternion(w=w, x=x, y=y, z=z),
             )
-            rest = np.array(values[16:]).reshape(6, 3)
-            w_I, f_I = apply.correct_imu(imu, *rest[:4])
-            np.testing.assert_allclose(w_I, rest[4], atol=1e-12)
-            np.testing.assert_allclose(f_I, rest[5], atol=1e-11)
+            optional = values[37:]
+            if len(optional) in (12, 18):
+                imu.gyro_g_sensitivity.extend(optional[:9])
+                optional = optional[9:]
+            imu.accel_position.extend(optional)
+            rest = np.array(values[16:37]).reshape(7, 3)
+            w_I, f_I = apply.correct_imu(imu, *rest[:5])
+            np.testing.assert_allclose(w_I, rest[5], atol=1e-12)
+            np.testing.assert_allclose(f_I, rest[6], atol=1e-11)
             # Many at once.
-            w_I, _ = apply.correct_imu(
-                imu, np.tile(rest[0], (4, 1)), rest[1], rest[2], rest[3]
+            w_I, f_I = apply.correct_imu(
+                imu, np.tile(rest[0], (4, 1)), *rest[1:4], dw_I=rest[4]
             )
-            np.testing.assert_allclose(w_I, np.tile(rest[4], (4, 1)))
+            np.testing.assert_allclose(w_I, np.tile(rest[5], (4, 1)))
+            np.testing.assert_allclose(
+                f_I, np.tile(rest[6], (4, 1)), atol=1e-11
+            )
 
     def test_projects(self) -> None:
         seen = 0

@@ -1,6 +1,7 @@
 // Prints what core/model makes of random calibrations, for the Python package
 // to make the same of them: a line each of
-//   imu s_g m_g s_a m_a q_AI(w x y z) gyro accel b_g b_a w_I f_I
+//   imu s_g m_g s_a m_a q_AI(w x y z) gyro accel b_g b_a dw_I w_I f_I
+//     and then 0 or 9 numbers of T_s row by row, and 0, 3 or 9 of r
 //   camera MODEL f c coefficients...
 //   project p_C found z_px         with the camera before
 //   unproject z_px found bearing_C
@@ -31,8 +32,9 @@ void PrintImu(const selfcal::ImuCalibration& imu, RandomValues* random) {
   const Eigen::Vector3d accel = random->Vector(3, 20);
   const Eigen::Vector3d b_g = random->Vector(3, 0.1);
   const Eigen::Vector3d b_a = random->Vector(3, 0.5);
+  const Eigen::Vector3d dw_I = random->Vector(3, 20);
   const selfcal::BodyRates rates =
-      selfcal::CorrectImu(imu, gyro, accel, b_g, b_a);
+      selfcal::CorrectImu(imu, gyro, accel, b_g, b_a, dw_I);
   const Eigen::Vector4d q(
       imu.q_AI.w(), imu.q_AI.x(), imu.q_AI.y(), imu.q_AI.z());
   Print("imu",
@@ -45,8 +47,11 @@ void PrintImu(const selfcal::ImuCalibration& imu, RandomValues* random) {
          accel,
          b_g,
          b_a,
+         dw_I,
          rates.w_I,
-         rates.f_I});
+         rates.f_I,
+         imu.gyro_g_sensitivity,
+         imu.accel_position});
 }
 
 void PrintCamera(const selfcal::CameraCalibration& camera,
@@ -75,6 +80,10 @@ int main() {
   for (int trial = 0; trial < 20; ++trial) {
     const selfcal::Calibration theta = random.Theta();
     PrintImu(theta.imu, &random);
+    selfcal::ImuCalibration coupled = theta.imu;
+    coupled.gyro_g_sensitivity = random.Vector(trial % 2 * 9, 1e-2);
+    coupled.accel_position = random.Vector(trial % 3 == 0 ? 3 : 9, 0.1);
+    PrintImu(coupled, &random);
     for (const selfcal::DistortionModel model : selfcal::DistortionModels()) {
       PrintCamera(random.Camera(model), &random);
     }
