@@ -6,7 +6,9 @@
 #include "core/calibration/calibration_run.h"
 #include "core/calibration/partition.h"
 #include "core/calibration/segment_agreement.h"
+#include "core/information/offset_start.h"
 #include "core/information/segment_scorer.h"
+#include "core/model/median.h"
 
 namespace selfcal {
 namespace {
@@ -162,6 +164,29 @@ CalibrationResult CalibrateOnWhatAgrees(
   return std::move(run.result);
 }
 
+// Moves segments whose states do not hold at their stamps, and the time offsets
+// of theta by the median of what these segments show. `moved` has room for all
+// and holds those that replace elements of `segments`.
+void StartAtOffsets(const Rig& rig,
+                    Calibration* theta,
+                    std::vector<const MotionSegment*>* segments,
+                    std::vector<MotionSegment>* moved) {
+  std::vector<double> shifts;
+  moved->reserve(segments->size());
+  for (const MotionSegment*& segment : *segments) {
+    std::optional<OffsetStart> start = FindOffsetStart(rig, *theta, *segment);
+    if (!start) continue;
+    moved->push_back(std::move(start->segment));
+    segment = &moved->back();
+    shifts.push_back(start->shift_s);
+  }
+  if (shifts.empty()) return;
+  const double shift_s = UpperMedian(std::move(shifts));
+  for (CameraCalibration& camera : theta->cameras) {
+    camera.time_offset_s += shift_s;
+  }
+}
+
 }  // namespace
 
 CalibrationResult Calibrate(const Rig& rig,
@@ -169,7 +194,7 @@ CalibrationResult Calibrate(const Rig& rig,
                             const std::vector<MotionSegment>& segments,
                             const CalibrateOptions& options,
                             const ProgressCallback& progress) {
-  const std::vector<const MotionSegment*> sorted = SortByKey(segments);
+  std::vector<const MotionSegment*> sorted = SortByKey(segments);
   const std::string problem = CheckInput(rig, theta_start, options, sorted);
   if (!problem.empty()) {
     CalibrationResult result;
@@ -177,11 +202,13 @@ CalibrationResult Calibrate(const Rig& rig,
     result.theta = theta_start;
     return result;
   }
+  Calibration theta = theta_start;
+  std::vector<MotionSegment> moved;
+  StartAtOffsets(rig, &theta, &sorted, &moved);
   if (options.exclude_contradictions) {
-    return CalibrateOnWhatAgrees(rig, theta_start, sorted, options, progress);
+    return CalibrateOnWhatAgrees(rig, theta, sorted, options, progress);
   }
-  CalibrationRun run =
-      RunCalibration(rig, theta_start, sorted, options, progress);
+  CalibrationRun run = RunCalibration(rig, theta, sorted, options, progress);
   CompleteWithRemembered(rig, sorted, options, &run);
   return std::move(run.result);
 }

@@ -134,7 +134,9 @@ struct CalibrationResult {
 };
 
 // Calibrates on the segments (valid for the rig, distinct keys, any order),
-// starting from theta_start. The result does not depend on their order.
+// starting from theta_start, but for time offsets that the segments show to be
+// far from it (core/information/offset_start.h). The result does not depend on
+// the order of the segments.
 CalibrationResult Calibrate(const Rig& rig,
                             const Calibration& theta_start,
                             const std::vector<MotionSegment>& segments,

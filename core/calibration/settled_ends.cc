@@ -13,6 +13,7 @@
 #include "core/calibration/structured_solver.h"
 #include "core/calibration/theta_information.h"
 #include "core/factor/keyframe_motion.h"
+#include "core/information/offset_start.h"
 
 namespace selfcal {
 namespace {
@@ -129,9 +130,13 @@ MotionSegment SettleSegment(const Rig& rig,
 SegmentEnds SummariseSettledEnds(const Rig& rig,
                                  const Calibration& theta0,
                                  const MotionSegment& segment) {
-  SegmentEnds ends = SummariseEnds(rig, theta0, segment);
+  const std::optional<OffsetStart> start =
+      FindOffsetStart(rig, theta0, segment);
+  const Calibration& theta = start ? start->theta : theta0;
+  const MotionSegment& used = start ? start->segment : segment;
+  SegmentEnds ends = SummariseEnds(rig, theta, used);
   if (!IsFarFromMinimum(ends)) return ends;
-  return SummariseEnds(rig, theta0, SettleSegment(rig, theta0, segment));
+  return SummariseEnds(rig, theta, SettleSegment(rig, theta, used));
 }
 
 }  // namespace selfcal

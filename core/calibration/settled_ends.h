@@ -28,8 +28,8 @@ MotionSegment SettleSegment(const Rig& rig,
                             const MotionSegment& segment);
 
 // Computes SummariseEnds() of the segment, or of the settled segment if
-// IsFarFromMinimum(), which takes 30 times as long. The segment must be valid
-// for the rig.
+// IsFarFromMinimum(), which takes 30 times as long; from the start of
+// FindOffsetStart(), if there is one. The segment must be valid for the rig.
 SegmentEnds SummariseSettledEnds(const Rig& rig,
                                  const Calibration& theta0,
                                  const MotionSegment& segment);

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/factor/sampling.h"
+#include "core/information/offset_start.h"
 #include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
@@ -93,6 +95,22 @@ void SegmentScorer::Score(const Rig& rig,
                           const ScoreOptions& options,
                           SegmentInformation* result) {
   if (!components_.Fits(rig)) components_ = RigComponents(rig);
+  const std::optional<OffsetStart> start =
+      std::ranges::count(components_.estimated_time_offsets(), 0) == 0
+          ? FindOffsetStart(rig, theta0, segment)
+          : std::nullopt;
+  if (start) {
+    ScoreAt(rig, start->theta, start->segment, options, result);
+  } else {
+    ScoreAt(rig, theta0, segment, options, result);
+  }
+}
+
+void SegmentScorer::ScoreAt(const Rig& rig,
+                            const Calibration& theta0,
+                            const MotionSegment& segment,
+                            const ScoreOptions& options,
+                            SegmentInformation* result) {
   order_.Find(segment, static_cast<int>(theta0.cameras.size()));
   motions_.Measure(rig,
                    theta0,

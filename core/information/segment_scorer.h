@@ -41,6 +41,11 @@ class SegmentScorer {
              SegmentInformation* result);
 
  private:
+  void ScoreAt(const Rig& rig,
+               const Calibration& theta0,
+               const MotionSegment& segment,
+               const ScoreOptions& options,
+               SegmentInformation* result);
   double MeasureFit(const Rig& rig,
                     const MotionSegment& segment,
                     const SharedInformation& theta,

@@ -13,13 +13,8 @@
 namespace selfcal {
 namespace {
 
-constexpr int kMinIntervals = 10;
-// Slower motion cannot be distinguished from errors of a SLAM system.
-constexpr double kMinSpeed_radps = 0.05;
-// Residual shares of the rotations: that of an explanation is below kExplained;
-// one above kUnexplained needs an explanation, whose residual is at most a
-// third of that without it.
-constexpr double kExplained = 0.25;
+// Residual shares of the rotations: one above kUnexplained needs an
+// explanation, whose residual is at most a third of that without it.
 constexpr double kUnexplained = 0.5;
 constexpr double kGain = 3;
 
@@ -49,15 +44,6 @@ const Unit& NearestUnit(double speed_ratio) {
   return *nearest;
 }
 
-double MeanSpeed(const MotionData& data) {
-  double turn = 0, time = 0;
-  for (const MotionInterval& interval : data.intervals) {
-    turn += interval.turn.squaredNorm();
-    time += interval.dt_s * interval.dt_s;
-  }
-  return time > 0 ? std::sqrt(turn / time) : 0;
-}
-
 // Reasons why keyframes may have other axes than the IMU.
 enum class Turned { kImu, kCameraPoses, kInvertedExtrinsics };
 
@@ -85,11 +71,10 @@ class GyroCheck {
       : theta_(theta), data_(data), diagnosis_(diagnosis) {}
 
   GyroResult Run() {
-    const double speed = MeanSpeed(data_);
-    if (data_.intervals.size() < kMinIntervals || speed < kMinSpeed_radps) {
+    if (!Turns(data_)) {
       diagnosis_->not_checked.push_back(
           "gyroscope axes, units and time offset: the device hardly turns (" +
-          Figure(speed) + " rad/s over " +
+          Figure(MeanSpeed(data_)) + " rad/s over " +
           std::to_string(data_.intervals.size()) + " intervals of keyframes)");
       return {};
     }

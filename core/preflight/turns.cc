@@ -121,6 +121,21 @@ Moments MomentsAt(const MotionData& data,
 
 }  // namespace
 
+double MeanSpeed(const MotionData& data) {
+  double turn = 0, time = 0;
+  for (const MotionInterval& interval : data.intervals) {
+    turn += interval.turn.squaredNorm();
+    time += interval.dt_s * interval.dt_s;
+  }
+  return time > 0 ? std::sqrt(turn / time) : 0;
+}
+
+bool Turns(const MotionData& data) {
+  constexpr double kMinSpeed_radps = 0.05;
+  return data.intervals.size() >= kMinIntervals &&
+         MeanSpeed(data) >= kMinSpeed_radps;
+}
+
 RateFit FitRates(const MotionData& data,
                  const ImuCalibration& imu,
                  const RateHypothesis& hypothesis) {
@@ -174,7 +189,6 @@ OffsetFit RefineOffset(const MotionData& data,
 
 CoarseAlignment AlignRates(const MotionData& data, double unit) {
   constexpr double kMaxOffset_s = 0.5;
-  constexpr double kStep_s = 0.02;
   // Tolerance of the relative mean square, for the error of the coarse sum.
   constexpr double kCloser = 0.3;
   const RateSums sums = SumRates(data);
@@ -183,9 +197,9 @@ CoarseAlignment AlignRates(const MotionData& data, double unit) {
   double straight = std::numeric_limits<double>::max();
   double turned = straight;
   Moments at;
-  const int steps = static_cast<int>(std::lround(kMaxOffset_s / kStep_s));
+  const int steps = static_cast<int>(std::lround(kMaxOffset_s / kCoarseStep_s));
   for (int n = -steps; n <= steps; ++n) {
-    const double offset_s = n * kStep_s;
+    const double offset_s = n * kCoarseStep_s;
     const Moments m = MomentsAt(data, sums, offset_s);
     if (m.count < needed || !(m.turn > 0)) continue;
     for (const Eigen::Matrix3d& axes : SignedPermutations()) {

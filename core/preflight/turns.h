@@ -10,6 +10,18 @@
 
 namespace selfcal {
 
+// Least number of intervals that a fit rests on.
+inline constexpr int kMinIntervals = 10;
+// Residual share of the rotations below which rates explain them.
+inline constexpr double kExplained = 0.25;
+
+// Root mean square of the speed of the keyframes' rotations [rad/s].
+double MeanSpeed(const MotionData& data);
+
+// True if there are enough intervals, and the motion can be distinguished from
+// the errors of a SLAM system.
+bool Turns(const MotionData& data);
+
 // The readings in the documented frame and units are M times the received ones,
 // at a time that is offset_s later than the timestamps of the keyframes:
 //   Log(R_GI0^T R_GI1) = rotation by M w~ over [t0 + offset, t1 + offset].
@@ -43,6 +55,8 @@ struct OffsetFit {
 OffsetFit RefineOffset(const MotionData& data,
                        const ImuCalibration& imu,
                        const RateHypothesis& hypothesis);
+
+inline constexpr double kCoarseStep_s = 0.02;
 
 // Coarse and fast alignment over all axes and offsets: rates are summed as if
 // rotations were small. `unit` converts received rates to rad/s.

@@ -1,0 +1,70 @@
+#include "core/information/offset_start.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/factor/state_time.h"
+#include "core/information/inliers.h"
+#include "core/preflight/time_offset.h"
+
+namespace selfcal {
+namespace {
+
+constexpr double kSigmas = 6;
+
+// The states hold `late_s` after their stamps; moves them back.
+void MoveToStamps(const Rig& rig,
+                  const ImuCalibration& imu,
+                  double late_s,
+                  MotionSegment* segment) {
+  const std::int64_t late_ns = std::llround(late_s * 1e9);
+  for (KeyframeState& state : segment->keyframes) {
+    const std::int64_t stamp_ns = state.t_ns;
+    state.t_ns += late_ns;
+    state = MoveState(state, stamp_ns, segment->imu, imu, rig.gravity_mps2);
+  }
+}
+
+Calibration Later(const Calibration& theta, double by_s) {
+  Calibration later = theta;
+  for (CameraCalibration& camera : later.cameras) camera.time_offset_s += by_s;
+  return later;
+}
+
+double MedianResidual(const Rig& rig,
+                      const Calibration& theta,
+                      const MotionSegment& segment) {
+  return SelectInliers(rig, theta, segment, {})
+      .statistics.reprojection_median_px;
+}
+
+}  // namespace
+
+std::optional<OffsetStart> FindOffsetStart(const Rig& rig,
+                                           const Calibration& theta,
+                                           const MotionSegment& segment) {
+  const std::vector<char> estimated = EstimatedTimeOffsets(rig);
+  if (std::count(estimated.begin(), estimated.end(), 0) > 0) {
+    return std::nullopt;
+  }
+  const auto found = EstimateTimeOffset(theta, std::span(&segment, 1));
+  if (!found || std::abs(found->offset_s) <=
+                    std::max(kFarTimeOffset_s, kSigmas * found->sigma_s)) {
+    return std::nullopt;
+  }
+  OffsetStart start{theta, 0, segment};
+  MoveToStamps(rig, theta.imu, found->offset_s, &start.segment);
+  Calibration later = Later(theta, found->offset_s);
+  if (MedianResidual(rig, later, start.segment) <
+      MedianResidual(rig, theta, start.segment)) {
+    start.theta = std::move(later);
+    start.shift_s = found->offset_s;
+  }
+  return start;
+}
+
+}  // namespace selfcal

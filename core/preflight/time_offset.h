@@ -1,0 +1,43 @@
+// The time offset between the stamps of keyframes and the clock of the IMU, by
+// correlation: the offset at which the gyroscope's rotations between keyframes
+// are those of their states. It needs no start: a coarse search over all
+// offsets finds one for Gauss-Newton steps.
+//
+// The states of a SLAM system that assumes a wrong offset of its camera are
+// those at the exposures, at times that are wrong by the error of the offset.
+// The offset that is found is that error.
+//
+// Pure, deterministic, callable from any thread. Segments need not be valid.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "core/model/calibration.h"
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+// Range of the offset [s], of either sign. Segments need samples for that time
+// before their first and after their last keyframe (kImuPadding_s), or the
+// intervals at their ends are not used.
+inline constexpr double kMaxTimeOffset_s = 0.15;
+
+// Error of an offset that is reported [s]: what SLAM systems with a factory
+// calibration err by, in addition to 6 sigma of the fit.
+inline constexpr double kTimeOffsetError_s = 2e-3;
+
+struct TimeOffset {
+  double offset_s = 0;  // the states hold this much later than their stamps
+  double sigma_s = 0;   // of the fit: from the residuals of the rotations
+};
+
+// `theta` is the calibration that the SLAM system used; only its IMU matters.
+// nullopt if the offset is not determined: there are less than 10 intervals of
+// keyframes or they hardly turn, sigma is above 1 ms, the rates do not fit the
+// rotations at any offset (CheckGyro finds why), or the offset is outside the
+// range.
+std::optional<TimeOffset> EstimateTimeOffset(
+    const Calibration& theta, std::span<const MotionSegment> segments);
+
+}  // namespace selfcal
