@@ -17,11 +17,12 @@ namespace {
 void AddInertialLinks(const MotionSegment& segment,
                       int first_keyframe,
                       std::vector<InertialLink>* links) {
+  const std::span<const ImuSample> samples = SamplesFromFirstKeyframe(segment);
   for (std::size_t k = 1; k < segment.keyframes.size(); ++k) {
     const int after = first_keyframe + static_cast<int>(k);
     links->push_back({after - 1,
                       after,
-                      SamplesBetween(segment.imu,
+                      SamplesBetween(samples,
                                      segment.keyframes[k - 1].t_ns,
                                      segment.keyframes[k].t_ns)});
   }
@@ -87,7 +88,7 @@ int PieceOf(const Track& track, int observation) {
   return static_cast<int>(next - track.later_pieces.begin());
 }
 
-std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
+std::span<const ImuSample> SamplesBetween(std::span<const ImuSample> imu,
                                           std::int64_t t0_ns,
                                           std::int64_t t1_ns) {
   const auto earlier = [](const ImuSample& s, std::int64_t t_ns) {

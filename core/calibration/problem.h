@@ -67,7 +67,7 @@ struct CalibrationProblem {
 
 // The samples that cover the time from t0_ns to t1_ns, and on either side those
 // that determine the motion within it (sampling.h).
-std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
+std::span<const ImuSample> SamplesBetween(std::span<const ImuSample> imu,
                                           std::int64_t t0_ns,
                                           std::int64_t t1_ns);
 

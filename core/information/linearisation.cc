@@ -122,9 +122,10 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
                                        const Calibration& theta0,
                                        const MotionSegment& segment) {
   links_.clear();
+  const std::span<const ImuSample> samples = SamplesFromFirstKeyframe(segment);
   for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
     links_.push_back(
-        {&segment.keyframes[k], &segment.keyframes[k + 1], segment.imu});
+        {&segment.keyframes[k], &segment.keyframes[k + 1], samples});
   }
   roots_.resize(std::max(roots_.size(), links_.size()));
   inertial_.Linearise(links_,

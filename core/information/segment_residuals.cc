@@ -42,7 +42,7 @@ std::vector<IntervalResidual> Intervals(const Rig& rig,
   for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
     InertialMatrix covariance;
     IntervalResidual& interval = intervals.emplace_back();
-    interval.residual = EvaluateInertial(segment.imu,
+    interval.residual = EvaluateInertial(SamplesFromFirstKeyframe(segment),
                                          segment.keyframes[k],
                                          segment.keyframes[k + 1],
                                          theta.imu,

@@ -18,23 +18,30 @@ KeyframeState BoxPlus(const KeyframeState& state,
   return moved;
 }
 
-std::span<const ImuSample> SamplesBetweenKeyframes(
+std::span<const ImuSample> SamplesFromFirstKeyframe(
     const MotionSegment& segment) {
   const std::vector<ImuSample>& imu = segment.imu;
   if (segment.keyframes.empty()) return imu;
   const auto later = [](std::int64_t t_ns, const ImuSample& sample) {
     return t_ns < sample.t_ns;
   };
-  const auto earlier = [](const ImuSample& sample, std::int64_t t_ns) {
-    return sample.t_ns < t_ns;
-  };
   auto first = std::upper_bound(
       imu.begin(), imu.end(), segment.keyframes.front().t_ns, later);
   if (first != imu.begin()) --first;
+  return {first, imu.end()};
+}
+
+std::span<const ImuSample> SamplesBetweenKeyframes(
+    const MotionSegment& segment) {
+  const std::span<const ImuSample> imu = SamplesFromFirstKeyframe(segment);
+  if (segment.keyframes.empty()) return imu;
+  const auto earlier = [](const ImuSample& sample, std::int64_t t_ns) {
+    return sample.t_ns < t_ns;
+  };
   auto end = std::lower_bound(
-      first, imu.end(), segment.keyframes.back().t_ns, earlier);
+      imu.begin(), imu.end(), segment.keyframes.back().t_ns, earlier);
   if (end != imu.end()) ++end;
-  return {first, end};
+  return {imu.begin(), end};
 }
 
 }  // namespace selfcal

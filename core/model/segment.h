@@ -98,6 +98,13 @@ struct MotionSegment {
 std::span<const ImuSample> SamplesBetweenKeyframes(
     const MotionSegment& segment);
 
+// Samples from the last at or before the first keyframe on: those of inertial
+// factors. The integration also uses the neighbours of the samples about an
+// interval: with those of the padding before the first keyframe, its last
+// digits would not be those of a segment without.
+std::span<const ImuSample> SamplesFromFirstKeyframe(
+    const MotionSegment& segment);
+
 // One violated rule: the field, and what to do.
 struct Violation {
   std::string field;    // path, e.g. "keyframes[3].q_GI"

@@ -3,6 +3,7 @@
 #include <ceres/problem.h>
 
 #include <map>
+#include <span>
 #include <vector>
 
 #include "core/factor/ceres_factors.h"
@@ -87,11 +88,12 @@ void AddFactors(const Rig& rig,
         b->p[o.keyframe].data(),
         b->l.at(o.landmark).data());
   }
+  const std::span<const ImuSample> samples = SamplesFromFirstKeyframe(segment);
   for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
     const KeyframeState& x0 = segment.keyframes[k];
     const KeyframeState& x1 = segment.keyframes[k + 1];
     InertialMatrix covariance;
-    EvaluateInertial(segment.imu,
+    EvaluateInertial(samples,
                      x0,
                      x1,
                      theta0.imu,
@@ -101,7 +103,7 @@ void AddFactors(const Rig& rig,
                      &covariance);
     problem->AddResidualBlock(
         MakeInertialCost(theta0,
-                         segment.imu,
+                         samples,
                          x0.t_ns,
                          x1.t_ns,
                          rig.imu_noise,
