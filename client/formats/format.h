@@ -54,8 +54,9 @@ struct FormatInfo {
 std::vector<FormatInfo> Formats();
 
 // Reads the rig that the files of a tool describe; the files may have any names
-// and, unless they number the cameras (camera_info), any order. INVALID_ARGUMENT for an unknown format and, with the file and
-// the field, for files that cannot be parsed or are not a valid calibration.
+// and, unless they number the cameras (camera_info), any order.
+// INVALID_ARGUMENT for an unknown format and, with the file and the field, for
+// files that cannot be parsed or are not a valid calibration.
 absl::StatusOr<ImportedRig> ImportRig(const std::string& format,
                                       const std::vector<TextFile>& files,
                                       const FormatOptions& options);
