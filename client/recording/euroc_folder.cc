@@ -126,10 +126,11 @@ absl::StatusOr<EurocCamera> ReadCamera(const fs::path& folder,
                2,
                [&](std::int64_t t_ns, const Cells& cells) -> std::string {
                  const fs::path path = folder / "data" / std::string(cells[1]);
-                 if (!fs::is_regular_file(path)) {
-                   return fmt::format("the image {} is missing", path.string());
+                 if (fs::is_regular_file(path)) {
+                   camera.images.push_back({t_ns, path});
+                 } else if (missing++ == 0) {
+                   first_missing = path;
                  }
-                 camera.images.push_back({t_ns, path});
                  return {};
                });
   if (!listed.ok()) return listed;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 namespace selfcal::client {
@@ -15,6 +16,9 @@ namespace {
 constexpr double kBrightnessTolerance = 0.01;
 // Cameras nearer to each other than this have no parallax to check.
 constexpr double kMinBaseline_m = 1e-3;
+// A point that another camera did not find is looked for again after so many
+// images.
+constexpr std::uint64_t kMatchAgain = 10;
 // Of the images in which patches are aligned.
 constexpr double kSmoothing_px = 0.8;
 // A patch that appears larger or smaller by more begins anew.
@@ -268,13 +272,13 @@ void FeatureTracker::CheckMotion(Camera* camera,
 
 void FeatureTracker::Replenish(int camera, const std::vector<char>& present) {
   Camera& c = cameras_[static_cast<std::size_t>(camera)];
-  const int room = options_.max_tracks - static_cast<int>(c.points.size());
-  if (room <= 0) return;
-  std::vector<cv::Point2f> taken;
-  for (const Point& point : c.points) taken.push_back(point.z_px);
-  const std::vector<cv::Point2f> corners =
-      FindCorners(c.image, taken, options_.corners);
   const std::size_t first = c.points.size();
+  std::vector<cv::Point2f> corners;
+  if (static_cast<int>(first) < options_.max_tracks) {
+    std::vector<cv::Point2f> taken;
+    for (const Point& point : c.points) taken.push_back(point.z_px);
+    corners = FindCorners(c.image, taken, options_.corners);
+  }
   for (const cv::Point2f& corner : corners) {
     if (static_cast<int>(c.points.size()) >= options_.max_tracks) break;
     Point point{next_landmark_++, corner, nullptr};
@@ -291,12 +295,28 @@ void FeatureTracker::Replenish(int camera, const std::vector<char>& present) {
   }
 }
 
+std::vector<FeatureTracker::Point> FeatureTracker::Unmatched(
+    const Camera& from, std::size_t first, const Camera& to) const {
+  std::unordered_set<std::uint64_t> matched;
+  for (const Point& point : to.points) matched.insert(point.landmark);
+  std::vector<Point> open;
+  for (std::size_t i = 0; i < from.points.size(); ++i) {
+    const Point& point = from.points[i];
+    const bool due =
+        (point.landmark + static_cast<std::uint64_t>(images_)) % kMatchAgain ==
+        0;
+    if ((i >= first || due) && !matched.contains(point.landmark)) {
+      open.push_back(point);
+    }
+  }
+  return open;
+}
+
 void FeatureTracker::MatchNew(const Camera& from,
                               std::size_t first,
                               Camera* to) {
-  std::vector<Point> open(
-      from.points.begin() + static_cast<std::ptrdiff_t>(first),
-      from.points.end());
+  std::vector<Point> open = Unmatched(from, first, *to);
+  std::optional<Pyramid> as_bright;
   for (const double distance_m : options_.stereo_distances_m) {
     std::vector<cv::Point2f> points;
     std::vector<cv::Point2f> found;
@@ -313,8 +333,19 @@ void FeatureTracker::MatchNew(const Camera& from,
       warps.push_back(warp);
       index.push_back(i);
     }
+    if (points.empty()) continue;
+    if (!as_bright) {
+      const double ratio = BrightnessRatio(
+          from.image, to->image, points, found, options_.flow.window_px);
+      as_bright = from.pyramid;
+      if (std::abs(ratio - 1) > kBrightnessTolerance) {
+        cv::Mat scaled;
+        from.image.convertTo(scaled, CV_8U, ratio);
+        as_bright = PyramidOf(scaled);
+      }
+    }
     const std::vector<char> ok =
-        FollowPatches(from.pyramid, to->pyramid, points, options_.flow, &found);
+        FollowPatches(*as_bright, to->pyramid, points, options_.flow, &found);
     std::vector<char> still_open(open.size(), 1);
     for (std::size_t n = 0; n < ok.size(); ++n) {
       if (!ok[n] || !IsInside(to->image, found[n], kPatchBorder_px)) continue;
@@ -336,7 +367,7 @@ void FeatureTracker::MatchNew(const Camera& from,
 
 bool FeatureTracker::HasRoom(const Camera& camera,
                              const cv::Point2f& z_px) const {
-  return static_cast<int>(camera.points.size()) < options_.max_tracks &&
+  return static_cast<int>(camera.points.size()) < 2 * options_.max_tracks &&
          std::all_of(camera.points.begin(),
                      camera.points.end(),
                      [&](const Point& other) {

@@ -31,7 +31,9 @@
 namespace selfcal::client {
 
 struct TrackerOptions {
-  int max_tracks = 200;  // in each camera
+  // Corners begin in a camera with fewer tracks; matches of other cameras come
+  // on top, up to as many again.
+  int max_tracks = 200;
   CornerOptions corners;
   FlowOptions flow;
   // The distance of matches from their epipolar plane, between the images of
@@ -138,6 +140,11 @@ class FeatureTracker {
                    const std::vector<cv::Point2f>& before,
                    double before_s);
   void Replenish(int camera, const std::vector<char>& present);
+  // Points to look for in another camera: those from `first` on, which are new,
+  // and some of the others.
+  std::vector<Point> Unmatched(const Camera& from,
+                               std::size_t first,
+                               const Camera& to) const;
   void MatchNew(const Camera& from, std::size_t first, Camera* to);
   bool HasRoom(const Camera& camera, const cv::Point2f& z_px) const;
   void CheckStereo(Camera* a, Camera* b);

@@ -72,7 +72,8 @@ double BrightnessRatio(const cv::Mat& from,
                        const std::vector<cv::Point2f>& from_points,
                        const std::vector<cv::Point2f>& to_points,
                        int window_px) {
-  const cv::Rect frame(0, 0, from.cols, from.rows);
+  const cv::Rect from_frame(0, 0, from.cols, from.rows);
+  const cv::Rect to_frame(0, 0, to.cols, to.rows);
   const auto patch = [&](const cv::Point2f& p) {
     return cv::Rect(cvRound(p.x) - window_px / 2,
                     cvRound(p.y) - window_px / 2,
@@ -83,7 +84,7 @@ double BrightnessRatio(const cv::Mat& from,
   for (std::size_t i = 0; i < from_points.size(); ++i) {
     const cv::Rect a = patch(from_points[i]);
     const cv::Rect b = patch(to_points[i]);
-    if ((a & frame) != a || (b & frame) != b) continue;
+    if ((a & from_frame) != a || (b & to_frame) != b) continue;
     const double before = cv::sum(from(a))[0];
     if (before > 0) ratios.push_back(cv::sum(to(b))[0] / before);
   }

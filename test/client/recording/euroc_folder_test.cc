@@ -279,9 +279,9 @@ TEST(EurocImages, RealImagesAreTracked) {
   RecordProperty("points_per_image", std::to_string(per_image));
   RecordProperty("track_length", std::to_string(length));
   RecordProperty("stereo_per_image", std::to_string(stereo / images));
-  EXPECT_GT(per_image, 90);
-  EXPECT_GT(length, 8);
-  EXPECT_GT(stereo / images, 40u);
+  EXPECT_GT(per_image, 150);
+  EXPECT_GT(length, 40);
+  EXPECT_GT(stereo / images, 100u);
 }
 
 }  // namespace
