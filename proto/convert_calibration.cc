@@ -201,8 +201,8 @@ void ReadBlock(const BlockInfo& info,
   const auto* reflection = message.GetReflection();
   const int size = reflection->FieldSize(message, field);
   if (size > kMaxOptionalSize) {
-    violations->push_back({prefix + field->name(),
-                           "has " + std::to_string(size) + " values"});
+    violations->push_back(
+        {prefix + field->name(), "has " + std::to_string(size) + " values"});
     return;
   }
   value->resize(size);

@@ -2,8 +2,8 @@
 // deviation of single readings.
 //
 // White noise of density N [unit/sqrt(Hz)], averaged over the time between two
-// readings, has the variance N^2 f at the rate f (Kalibr's wiki, page "IMU Noise
-// Model"). That holds for readings whose filter passes half their rate. A
+// readings, has the variance N^2 f at the rate f (Kalibr's wiki, page "IMU
+// Noise Model"). That holds for readings whose filter passes half their rate. A
 // narrower one makes single readings quieter, and their sum over time is not:
 // their density is larger than this.
 #pragma once

@@ -95,8 +95,8 @@ struct SimulatedSession {
 // remaining keyframes at the end that do not fill a segment are dropped. Times
 // are relative to the start of the trajectory; keyframes do not coincide with
 // IMU samples, and all exposures lie within these. theta_true and theta_slam
-// must have the same cameras, with a rolling shutter or not; rates, depths, mean_track_length and
-// keyframes_per_segment must be positive.
+// must have the same cameras, with a rolling shutter or not; rates, depths,
+// mean_track_length and keyframes_per_segment must be positive.
 SimulatedSession Simulate(const Rig& rig,
                           const Calibration& theta_true,
                           const Calibration& theta_slam,

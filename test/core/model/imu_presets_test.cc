@@ -87,7 +87,8 @@ TEST(ImuPresets, TheLastReadingOfARangeIsSaturated) {
         {2, Eigen::Vector3d::Constant(0.99 * full_scale.gyro_radps), {0, 0, 9}},
         {3, {0, 0, 0}, Eigen::Vector3d::Constant(0.99 * full_scale.accel_mps2)},
     };
-    EXPECT_EQ(CountSaturatedReadings(segment.imu, full_scale), 2u) << sensor.name;
+    EXPECT_EQ(CountSaturatedReadings(segment.imu, full_scale), 2u)
+        << sensor.name;
     RemoveSaturatedReadings(full_scale, &segment);
     EXPECT_EQ(segment.imu.front().t_ns, 2) << sensor.name;
   }
