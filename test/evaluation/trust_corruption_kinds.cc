@@ -128,6 +128,10 @@ TrustKind BadSample(std::string name,
       kSpikeEvery,
       [=](const TrustDevice&, const SimulatedSession& session, int i) {
         return CorruptGyroSample(session.segments[i], value_radps, i);
+      },
+      // It is beyond the full scale, and left out: the segment is sound.
+      [](const TrustDevice&, const SimulatedSession& session, int i) {
+        return session.segments[i];
       });
 }
 
