@@ -21,10 +21,11 @@
 // white: over a step its mean has the variance density^2 / h on the raw reading
 // and is transformed by T^-1; it is larger where samples are missing
 // (sampling.h). Of a coupled IMU, what each sensor's noise does to the readings
-// of the other is included only for the gyroscope, without dw/dt: the rest is
-// less than a thousandth of the variance for 1e-3 rad s/m and a few cm. Biases
-// random-walk from their given values at the beginning of the interval
-// (preintegration_bias_walk.h).
+// of the other is left out, but for the centripetal force: for 1e-3 rad s/m and
+// 5 cm, over 0.1 s, the noise of the accelerometer is a thousandth of the
+// variance of the rotation, and that of the rate at either end 4 % of the
+// variance of the velocity. Biases random-walk from their given values at the
+// beginning of the interval (preintegration_bias_walk.h).
 //
 // Pure, callable from any thread; allocates nothing.
 // Source: Schneider et al., ICRA 2017, III-B and III-D; Forster et al., "On-
