@@ -132,6 +132,10 @@ TEST(Layout, OfTheCalibration) {
   EXPECT_MEMBER(selfcal_imu, accel_scale, 56, 24);
   EXPECT_MEMBER(selfcal_imu, accel_misalignment, 80, 24);
   EXPECT_MEMBER(selfcal_imu, q_AI, 104, 32);
+  EXPECT_MEMBER(selfcal_imu, gyro_g_sensitivity_size, 136, 4);
+  EXPECT_MEMBER(selfcal_imu, accel_position_size, 140, 4);
+  EXPECT_MEMBER(selfcal_imu, gyro_g_sensitivity, 144, 72);
+  EXPECT_MEMBER(selfcal_imu, accel_position, 216, 72);
   EXPECT_EQ(c::kImuSize, 136u);
 
   EXPECT_MEMBER(selfcal_camera, struct_size, 0, 4);
