@@ -594,7 +594,7 @@ TEST(ImportKalibr, ReadsThePositionOfTheAccelerometer) {
         fmt::format("    rx_i: {0}\n    ry_i: {0}\n    rz_i: {0}\n", list));
     const auto rig = ImportRig("kalibr", files, {});
     ASSERT_TRUE(rig.ok()) << rig.status();
-    EXPECT_THAT(rig->losses, IsEmpty());
+    EXPECT_TRUE(rig->losses.empty());
     EXPECT_EQ(rig->rig.factory.imu.accel_position.size(), 3);
     EXPECT_EQ(rig->rig.factory.imu.gyro_g_sensitivity.size(), 0);
     ExpectSamePredictions(

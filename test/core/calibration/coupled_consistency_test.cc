@@ -1,6 +1,8 @@
 // Tests that the g-sensitivity of a gyroscope and the positions of an
 // accelerometer's axes are estimated within what the covariance claims, and
-// that an estimate which ignores them is not.
+// that an estimate which ignores positions is not. (One that ignores the
+// g-sensitivity of these devices is: its effect is below the noise of so short
+// a session, NEES 97 of 104.)
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -92,7 +94,20 @@ TEST_P(Coupled, IsFoundWithinItsSigmas) {
   });
 }
 
-TEST_P(Coupled, IgnoredBiasesOtherParameters) {
+std::vector<CoupledCase> CasesWithPositions() {
+  std::vector<CoupledCase> cases = Cases();
+  std::erase_if(cases, [](const CoupledCase& of) { return of.positions == 0; });
+  return cases;
+}
+
+class IgnoredPositions : public testing::TestWithParam<CoupledCase> {};
+
+INSTANTIATE_TEST_SUITE_P(Imus,
+                         IgnoredPositions,
+                         testing::ValuesIn(CasesWithPositions()),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(IgnoredPositions, BiasOtherParameters) {
   const CoupledCase& of = GetParam();
   double nees = 0;
   int components = 0;
