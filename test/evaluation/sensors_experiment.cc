@@ -300,8 +300,12 @@ void AddAccuracy(const Setting& setting,
   const auto components = TangentComponents(setting.rig.factory);
   std::vector<Cell> row = {setting.name};
   for (const Block& block : kBlocks) {
-    const Accuracy accuracy =
-        AccuracyOf(runs, MatchComponents(components, {block.pattern}));
+    const std::vector<int> some = MatchComponents(components, {block.pattern});
+    if (some.empty()) {
+      row.insert(row.end(), 2, Cell());
+      continue;
+    }
+    const Accuracy accuracy = AccuracyOf(runs, some);
     row.emplace_back(accuracy.error_rms / block.unit);
     row.emplace_back(accuracy.sigma_rms / block.unit);
   }
