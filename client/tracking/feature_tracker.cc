@@ -56,14 +56,12 @@ void Keep(const std::vector<char>& marks, std::vector<T>* values) {
 FeatureTracker::FeatureTracker(const Calibration& theta,
                                const TrackerOptions& options)
     : options_(options), gyro_(theta.imu, options.b_g) {
-  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
-    const CameraCalibration& c = theta.cameras[j];
+  for (const CameraCalibration& c : theta.cameras) {
     Camera camera;
     camera.theta = c;
     camera.origin_I = -(c.q_CI.conjugate() * c.p_CI);
     camera.px_per_rad = PixelsPerRadian(c).mean();
-    camera.line_delay_s =
-        j < options.line_delays_s.size() ? options.line_delays_s[j] : 0;
+    camera.line_delay_s = c.line_delay_s.value_or(0);
     canvas_.width = std::max(canvas_.width, c.width_px);
     canvas_.height = std::max(canvas_.height, c.height_px);
     cameras_.push_back(std::move(camera));

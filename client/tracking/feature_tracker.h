@@ -48,9 +48,6 @@ struct TrackerOptions {
   // no longer resembles that. False: from image to image only.
   bool align = true;
   double min_correlation = 0.8;  // of the greys of both patches
-  // Rolling shutter: delay of each row after the one before, one value for each
-  // camera; empty: all rows at once.
-  std::vector<double> line_delays_s;
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();  // [rad/s]
 };
 

@@ -23,15 +23,20 @@
 namespace selfcal::server {
 namespace {
 
-// The new rig of a request, checked; fields are named below "rig.".
-absl::StatusOr<StoredRig> ReadNewRig(const v1::Rig& message) {
+enum class Age { kNew, kExisting };
+
+// The rig of a request, checked; fields are named below "rig.". A new one gets
+// the optional blocks that it estimates.
+absl::StatusOr<StoredRig> ReadRig(const v1::Rig& message, Age age) {
   StoredRig stored;
   Rig& rig = stored.rig;
   auto violations = FromProto(message, "rig.", &rig);
   if (!violations.empty()) return InvalidFields(violations);
-  AddEstimatedBlocks(rig.blocks, &rig.factory);
-  if (message.groups().empty()) {
-    rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  if (age == Age::kNew) {
+    AddEstimatedBlocks(rig.blocks, &rig.factory);
+    if (message.groups().empty()) {
+      rig.groups = DefaultGroups(rig.blocks, rig.factory);
+    }
   }
   violations = Validate(stored.rig);
   for (Violation& violation : violations) {
@@ -56,7 +61,8 @@ absl::StatusOr<v1::Rig> CreateRig(const ApiContext& context,
                                   const Call&,
                                   const v1::CreateRigRequest& request) {
   if (!request.has_rig()) return InvalidFields({{"rig", "is missing"}});
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadNewRig(request.rig()));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig,
+                           ReadRig(request.rig(), Age::kNew));
   const auto created = context.domain->CreateRig(rig);
   if (!created.ok()) {
     return About(created.status(), {kRigType, request.rig().name(), "rig"});
@@ -135,7 +141,7 @@ absl::StatusOr<v1::Rig> UpdateRig(const ApiContext& context,
       other->GetReflection()->ClearField(other, field);
     }
     rig.MergeFrom(set);
-    return ReadRig(rig);
+    return ReadRig(rig, Age::kExisting);
   };
   const auto updated =
       context.pipeline->UpdateRig(*id, change, call.caller.name);

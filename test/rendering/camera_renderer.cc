@@ -114,6 +114,7 @@ CameraRenderer::CameraRenderer(const CameraCalibration& camera)
       width_px_(camera.width_px),
       height_px_(camera.height_px),
       tiles_((camera.width_px + kTile - 1) / kTile),
+      line_delay_s_(camera.line_delay_s.value_or(0)),
       px_per_rad_(PixelsPerRadian(camera).maxCoeff()) {
   CacheRays(camera);
   CacheCones();
@@ -174,10 +175,10 @@ void CameraRenderer::CacheCones() {
 
 int CameraRenderer::RaysPerPixel(const Trajectory& trajectory,
                                  double t_s,
-                                 const Shutter& shutter) const {
+                                 double exposure_s) const {
   const BodyMotion motion = trajectory.At(t_s);
   const double radps = motion.w_I.norm() + motion.v_GI.norm() / kBlurDistance_m;
-  const double blur_px = shutter.exposure_s * radps * px_per_rad_;
+  const double blur_px = exposure_s * radps * px_per_rad_;
   return kPattern *
          std::max(1, static_cast<int>(std::ceil(blur_px / kPattern)));
 }
@@ -185,18 +186,17 @@ int CameraRenderer::RaysPerPixel(const Trajectory& trajectory,
 void CameraRenderer::Render(const Scene& scene,
                             const Trajectory& trajectory,
                             double t_s,
-                            const Shutter& shutter,
+                            double exposure_s,
                             std::vector<float>* radiance) const {
-  const int rays = RaysPerPixel(trajectory, t_s, shutter);
+  const int rays = RaysPerPixel(trajectory, t_s, exposure_s);
   const int stride = tiles_ * kTile;
   std::vector<float> sums(static_cast<std::size_t>(stride) * height_px_, 0);
   std::vector<Solid> solids(scene.boxes.size() + 1);
   for (int k = 0; k < rays; ++k) {
     const double phase = (k + 0.5) / rays - 0.5;
     for (int v = 0; v < height_px_; ++v) {
-      if (v == 0 || shutter.line_delay_s != 0) {
-        const double row_s =
-            t_s + v * shutter.line_delay_s + phase * shutter.exposure_s;
+      if (v == 0 || line_delay_s_ != 0) {
+        const double row_s = t_s + v * line_delay_s_ + phase * exposure_s;
         Place(scene, trajectory.At(row_s), row_s, &solids);
       }
       // Rays take the levels above and below by turns.

@@ -20,13 +20,6 @@
 
 namespace selfcal {
 
-// The exposure of row v is centred on t + v line_delay_s, if that of row 0 is
-// centred on t.
-struct Shutter {
-  double exposure_s = 0;
-  double line_delay_s = 0;
-};
-
 class CameraRenderer {
  public:
   explicit CameraRenderer(const CameraCalibration& camera);
@@ -37,18 +30,19 @@ class CameraRenderer {
   // Fills *radiance, row by row, with values in [0, 1]: the texture's value
   // times the brightness of the face. Pixels to which no point projects are 0.
   // t_s is the middle of the exposure of row 0 on the clock of the trajectory,
-  // which must cover all exposures.
+  // which must cover all exposures; those of the other rows of a rolling
+  // shutter follow by the line delay of the camera.
   void Render(const Scene& scene,
               const Trajectory& trajectory,
               double t_s,
-              const Shutter& shutter,
+              double exposure_s,
               std::vector<float>* radiance) const;
 
   // Number of rays for each pixel: more for a motion that blurs, about one for
   // each pixel of the blur of a point at a distance of 1 m.
   int RaysPerPixel(const Trajectory& trajectory,
                    double t_s,
-                   const Shutter& shutter) const;
+                   double exposure_s) const;
 
  private:
   static constexpr int kPattern = 4;  // places of rays within a pixel
@@ -86,6 +80,7 @@ class CameraRenderer {
   int width_px_;
   int height_px_;
   int tiles_;  // of a row
+  double line_delay_s_;
   double px_per_rad_;
   Rays rays_[kPattern];
   std::vector<float> angle_;  // that a ray of a pixel stands for [rad]; 0: none

@@ -71,9 +71,9 @@ cv::Mat Rendered(const CameraCalibration& camera,
                  const Scene& scene,
                  const Trajectory& motion,
                  double t_s,
-                 const Shutter& shutter) {
+                 double exposure_s) {
   std::vector<float> radiance;
-  CameraRenderer(camera).Render(scene, motion, t_s, shutter, &radiance);
+  CameraRenderer(camera).Render(scene, motion, t_s, exposure_s, &radiance);
   return AsImage(camera, radiance);
 }
 
@@ -158,12 +158,12 @@ INSTANTIATE_TEST_SUITE_P(Models,
                                            DistortionModels().end()));
 
 TEST(CameraRenderer, RowsOfARollingShutterAreSeenWhenTheyAreExposed) {
-  const CameraCalibration camera =
+  CameraCalibration camera =
       ForwardCamera(LensRig(DistortionModel::kFov).factory.cameras[0]);
+  camera.line_delay_s = 40e-6;
   const SteadyMotion motion({0.3, 0.4, 1.5}, {0.1, 0.5, 0});
   const Scene scene = ChessRoom();
-  const Shutter rolling{0, 40e-6};
-  const cv::Mat image = Smoothed(Rendered(camera, scene, motion, 1, rolling));
+  const cv::Mat image = Smoothed(Rendered(camera, scene, motion, 1, 0));
   int corners = 0;
   double moved = 0;
   for (const Eigen::Vector3d& p_G : CornersAhead(3)) {
@@ -173,7 +173,7 @@ TEST(CameraRenderer, RowsOfARollingShutterAreSeenWhenTheyAreExposed) {
     Eigen::Vector2d z_px;
     bool seen = true;
     for (int i = 0; i < 20 && seen; ++i) {
-      const BodyMotion at_row = motion.At(1 + row * rolling.line_delay_s);
+      const BodyMotion at_row = motion.At(1 + row * *camera.line_delay_s);
       seen = ProjectFrom(camera, at_row, p_G, &z_px);
       row = z_px.y();
     }
@@ -218,7 +218,7 @@ TEST(CameraRenderer, EdgesAreBlurredByTheMotionDuringTheExposure) {
   const int row = static_cast<int>(std::lround(z_px.y()));
   const int middle = static_cast<int>(std::lround(z_px.x()));
   const auto width = [&](double exposure_s) {
-    const cv::Mat image = Rendered(camera, scene, motion, 1, {exposure_s, 0});
+    const cv::Mat image = Rendered(camera, scene, motion, 1, exposure_s);
     return EdgeWidth(image, row, middle - 22, middle + 22);
   };
   const double sharp = width(0);
@@ -240,15 +240,15 @@ TEST(CameraRenderer, SurfacesAreThoseThatRaysMeet) {
   options.moving_boxes = 4;
   Scene scene = MakeRoom(*trajectory, options, 4);
   scene.texture = Texture(0, 1, {255});
-  const CameraCalibration camera = HandheldRig("x").factory.cameras[0];
-  const Shutter rolling{0, 50e-6};
+  CameraCalibration camera = HandheldRig("x").factory.cameras[0];
+  camera.line_delay_s = 50e-6;
   std::vector<std::size_t> seen(scene.boxes.size() + 1, 0);
   int wrong = 0;
   int pixels = 0;
   for (const double t_s : {1.0, 3.0, 5.0, 7.0, 9.0}) {
-    const cv::Mat image = Rendered(camera, scene, *trajectory, t_s, rolling);
+    const cv::Mat image = Rendered(camera, scene, *trajectory, t_s, 0);
     for (int v = 0; v < camera.height_px; v += 3) {
-      const double row_s = t_s + v * rolling.line_delay_s;
+      const double row_s = t_s + v * *camera.line_delay_s;
       const BodyMotion motion = trajectory->At(row_s);
       const Eigen::Quaterniond q_GC = motion.q_GI * camera.q_CI.conjugate();
       const Eigen::Vector3d p_GC = motion.p_GI - q_GC * camera.p_CI;

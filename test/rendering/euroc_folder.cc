@@ -88,8 +88,8 @@ std::string CameraYaml(const CameraCalibration& camera,
                 camera.distortion.data() + camera.distortion.size(),
                 ", "),
       camera.time_offset_s,
-      options.shutter.line_delay_s,
-      options.shutter.exposure_s);
+      camera.line_delay_s.value_or(0),
+      options.exposure_s);
 }
 
 constexpr std::string_view kBodyPose =

@@ -38,10 +38,14 @@ class EurocFolder : public testing::Test {
   // One recording for all tests, which only read it.
   static void SetUpTestSuite() {
     RenderOptions options;
-    options.shutter = {0.002, 20e-6};
+    options.exposure_s = 0.002;
+    Rig rig = StereoRig();
+    for (CameraCalibration& camera : rig.factory.cameras) {
+      camera.line_delay_s = 20e-6;
+    }
     folder_ = std::make_unique<TempFolder>(FolderInMemory());
     recording_ = std::make_unique<RenderedRecording>(
-        StereoRig(), MakeHandheld(0.3, 1, 1), options);
+        rig, MakeHandheld(0.3, 1, 1), options);
     WriteEurocFolder(*recording_, folder_->path());
   }
   static void TearDownTestSuite() {

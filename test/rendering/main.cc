@@ -109,11 +109,15 @@ void Define(CLI::App* app, Arguments* arguments) {
 
 int Run(Arguments arguments) {
   RenderOptions& options = arguments.options;
-  options.shutter = {arguments.exposure_ms * 1e-3,
-                     arguments.line_delay_us * 1e-6};
+  options.exposure_s = arguments.exposure_ms * 1e-3;
+  Rig rig = RigNamed(arguments.device);
+  if (arguments.line_delay_us > 0) {
+    for (CameraCalibration& camera : rig.factory.cameras) {
+      camera.line_delay_s = arguments.line_delay_us * 1e-6;
+    }
+  }
   const std::clock_t begin = std::clock();
-  const RenderedRecording recording(
-      RigNamed(arguments.device), MotionNamed(arguments), options);
+  const RenderedRecording recording(rig, MotionNamed(arguments), options);
   const int total = recording.cameras() * recording.images();
   WriteEurocFolder(recording, arguments.folder, [&](int images) {
     if (images % 20 == 0 || images == total) {

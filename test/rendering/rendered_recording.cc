@@ -25,8 +25,8 @@ std::vector<std::int64_t> Stamps(const Rig& rig,
   double before_s = 0;
   double after_s = 0;
   for (const CameraCalibration& camera : rig.factory.cameras) {
-    const double half_s = options.shutter.exposure_s / 2;
-    const double rows_s = options.shutter.line_delay_s * camera.height_px;
+    const double half_s = options.exposure_s / 2;
+    const double rows_s = camera.line_delay_s.value_or(0) * camera.height_px;
     before_s = std::max(before_s, half_s - camera.time_offset_s);
     after_s = std::max(after_s, half_s + rows_s + camera.time_offset_s);
   }
@@ -61,7 +61,8 @@ GreyImage RenderedRecording::Image(int camera, int image) const {
   const auto j = static_cast<std::size_t>(camera);
   const double t_s = RowTime(camera, image, 0);
   std::vector<float> radiance;
-  renderers_[j].Render(scene_, *trajectory_, t_s, options_.shutter, &radiance);
+  renderers_[j].Render(
+      scene_, *trajectory_, t_s, options_.exposure_s, &radiance);
   return ReadOut(rig_.factory.cameras[j],
                  options_.sensor,
                  GainAt(options_.sensor, t_s),
@@ -73,7 +74,7 @@ double RenderedRecording::RowTime(int camera, int image, double row) const {
   const auto j = static_cast<std::size_t>(camera);
   return static_cast<double>(stamp_ns(image)) * 1e-9 +
          rig_.factory.cameras[j].time_offset_s +
-         row * options_.shutter.line_delay_s;
+         row * rig_.factory.cameras[j].line_delay_s.value_or(0);
 }
 
 std::optional<Hit> RenderedRecording::SurfaceAt(
@@ -107,7 +108,7 @@ bool RenderedRecording::TruePixel(int camera,
     const double seen_row = std::clamp(pixel.y(), 0.0, c.height_px - 1.0);
     const double change_px = std::abs(seen_row - row);
     row = seen_row;
-    if (options_.shutter.line_delay_s == 0 || change_px < kRowTolerance_px) {
+    if (!c.line_delay_s || change_px < kRowTolerance_px) {
       *z_px = pixel;
       return true;
     }

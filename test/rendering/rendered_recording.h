@@ -25,7 +25,7 @@ struct RenderOptions {
   std::uint64_t seed = 1;
   double image_rate_hz = 20;
   double imu_rate_hz = 200;
-  Shutter shutter;  // of every camera
+  double exposure_s = 0;  // of every row
   SceneOptions scene;
   SensorOptions sensor;
 };

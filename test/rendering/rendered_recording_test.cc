@@ -17,6 +17,9 @@ Rig SmallStereo() {
     camera.width_px /= 4;
     camera.height_px /= 4;
   }
+  for (CameraCalibration& camera : rig.factory.cameras) {
+    camera.line_delay_s = 100e-6;
+  }
   rig.factory.cameras[0].time_offset_s = 0.012;
   rig.factory.cameras[1].time_offset_s = -0.03;
   return rig;
@@ -25,7 +28,7 @@ Rig SmallStereo() {
 RenderOptions AllEffects() {
   RenderOptions options;
   options.seed = 5;
-  options.shutter = {0.004, 100e-6};
+  options.exposure_s = 0.004;
   options.scene.moving_boxes = 3;
   options.sensor.gain_amplitude = 0.3;
   return options;

@@ -25,10 +25,8 @@ TrackedRecording TrackKind(const RecordingKind& kind,
                            std::uint64_t seed,
                            int images) {
   const RenderedRecording recording = Render(kind, kSeconds, seed);
-  return TrackRecording(recording,
-                        kind.start(recording.rig().factory),
-                        OptionsOf(kind, recording),
-                        images);
+  return TrackRecording(
+      recording, kind.start(recording.rig().factory), kind.tracker, images);
 }
 
 // The tracks of a kind of recording, which several tests look at.

@@ -58,11 +58,11 @@ std::vector<RecordingKind> RecordingKinds() {
   kinds.push_back(Kind("calm", mono));
   kinds.back().excitation = 0.2;
   kinds.push_back(Kind("blur-8ms", mono));
-  kinds.back().render.shutter.exposure_s = 8e-3;
+  kinds.back().render.exposure_s = 8e-3;
   kinds.push_back(Kind("blur-20ms", mono));
-  kinds.back().render.shutter.exposure_s = 20e-3;
+  kinds.back().render.exposure_s = 20e-3;
   kinds.push_back(Kind("rolling-30ms", mono));
-  kinds.back().render.shutter.line_delay_s = 30e-3 / 480;
+  kinds.back().rig.factory.cameras[0].line_delay_s = 30e-3 / 480;
   kinds.push_back(Kind("gain", mono));
   kinds.back().render.sensor.gain_amplitude = 0.4;
   kinds.back().render.sensor.gain_period_s = 1;
@@ -98,14 +98,6 @@ RenderedRecording Render(const RecordingKind& kind,
   RenderOptions options = kind.render;
   options.seed = seed;
   return {kind.rig, MakeHandheld(seconds, kind.excitation, seed), options};
-}
-
-client::TrackerOptions OptionsOf(const RecordingKind& kind,
-                                 const RenderedRecording& recording) {
-  client::TrackerOptions options = kind.tracker;
-  options.line_delays_s.assign(static_cast<std::size_t>(recording.cameras()),
-                               recording.options().shutter.line_delay_s);
-  return options;
 }
 
 }  // namespace selfcal

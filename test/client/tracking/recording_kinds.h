@@ -39,8 +39,4 @@ RenderedRecording Render(const RecordingKind& kind,
                          double seconds,
                          std::uint64_t seed);
 
-// The tracker's options, with the shutter of the recording.
-client::TrackerOptions OptionsOf(const RecordingKind& kind,
-                                 const RenderedRecording& recording);
-
 }  // namespace selfcal

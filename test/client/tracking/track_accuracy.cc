@@ -19,7 +19,7 @@ void Print(const RecordingKind& kind, double seconds, std::uint64_t seed) {
   const TrackedRecording tracked =
       TrackRecording(recording,
                      kind.start(recording.rig().factory),
-                     OptionsOf(kind, recording),
+                     kind.tracker,
                      recording.images());
   const ErrorStatistics s = Summarise(tracked);
   std::size_t points = tracked.errors.size();

@@ -208,6 +208,7 @@ TEST(Inertial, CovarianceCarriesTheRotationNoiseThroughLog) {
   for (int trial = 0; trial < 200; ++trial) {
     const Factor factor =
         RandomFactor(random,
+                     random.Imu(),
                      200,
                      0.1,
                      random.Uniform(0, 3) * random.Normal3(1).normalized());
@@ -251,6 +252,7 @@ TEST(SquareRootInformation, WhitensTheCovarianceItCameFrom) {
   RandomValues random(8);
   for (int trial = 0; trial < 1000; ++trial) {
     Factor factor = RandomFactor(random,
+                                 random.Imu(),
                                  random.LogUniform(100, 1000),
                                  random.LogUniform(1e-3, 1),
                                  random.Normal3(0.1));
@@ -273,6 +275,7 @@ TEST(SquareRootInformation, IsFiniteForAnyPositiveNoise) {
   RandomValues random(9);
   for (int trial = 0; trial < 2000; ++trial) {
     Factor factor = RandomFactor(random,
+                                 random.Imu(),
                                  random.LogUniform(10, 1000),
                                  random.LogUniform(1e-8, 1),
                                  random.Normal3(0.1));

@@ -138,7 +138,7 @@ TEST(Calibration, ABlockThatACameraLacksHasNoComponents) {
   EXPECT_EQ(components[at].name, "cam1.line_delay");
   EXPECT_EQ(components[at].unit, "s");
   EXPECT_EQ(ReadableValues(theta)[at], 3e-5);
-  const VectorXd delta = random.Vector(TangentSize(theta), 1e-5);
+  const Eigen::VectorXd delta = random.Vector(TangentSize(theta), 1e-5);
   const Calibration moved = BoxPlus(theta, delta);
   EXPECT_EQ(moved.cameras[1].line_delay_s, 3e-5 + delta[at]);
   EXPECT_FALSE(moved.cameras[0].line_delay_s);
