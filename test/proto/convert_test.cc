@@ -53,7 +53,8 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
     EXPECT_EQ(x.height_px, y.height_px);
     EXPECT_TRUE(SameBits(x.time_offset_s, y.time_offset_s));
     ASSERT_EQ(x.line_delay_s.has_value(), y.line_delay_s.has_value());
-    if (x.line_delay_s) EXPECT_TRUE(SameBits(*x.line_delay_s, *y.line_delay_s));
+    EXPECT_TRUE(
+        SameBits(x.line_delay_s.value_or(0), y.line_delay_s.value_or(0)));
   }
 }
 

@@ -140,14 +140,15 @@ class Assembly {
   void AddInertial(int k) {
     InertialJacobians J;
     InertialMatrix covariance;
-    const InertialResidual r = EvaluateInertial(segment_.imu,
-                                                segment_.keyframes[k],
-                                                segment_.keyframes[k + 1],
-                                                theta0_.imu,
-                                                rig_.imu_noise,
-                                                rig_.gravity_mps2,
-                                                &J,
-                                                &covariance);
+    const InertialResidual r =
+        EvaluateInertial(SamplesFromFirstKeyframe(segment_),
+                         segment_.keyframes[k],
+                         segment_.keyframes[k + 1],
+                         theta0_.imu,
+                         rig_.imu_noise,
+                         rig_.gravity_mps2,
+                         &J,
+                         &covariance);
     const InertialMatrix W = SquareRootInformation(covariance);
     const int row = AddResidual(W * r);
     AddState(row, k, W * J.x0);

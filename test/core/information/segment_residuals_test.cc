@@ -67,7 +67,9 @@ TEST(SegmentResiduals, IntervalsAreWhitenedAsTheScoreWhitensThem) {
   ASSERT_EQ(residuals.intervals.size(), keyframes.size() - 1);
   std::vector<InertialLinkStates> links;
   for (std::size_t k = 0; k + 1 < keyframes.size(); ++k) {
-    links.push_back({&keyframes[k], &keyframes[k + 1], device.segment.imu});
+    links.push_back({&keyframes[k],
+                     &keyframes[k + 1],
+                     SamplesFromFirstKeyframe(device.segment)});
   }
   std::vector<InertialNoiseRoot> roots(links.size());
   InertialTransitions transitions;
