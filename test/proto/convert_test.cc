@@ -270,7 +270,10 @@ TEST(Convert, EveryMissingPartOfARigIsNamed) {
 
 TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   RandomValues random(7);
-  v1::Rig message = ToProto(random.RigValue());
+  Rig given = random.RigValue();
+  given.factory.cameras.resize(1, random.Camera());
+  given.factory.cameras[0].line_delay_s.reset();
+  v1::Rig message = ToProto(given);
   message.clear_gravity_mps2();
   message.clear_groups();
   message.clear_selection();
