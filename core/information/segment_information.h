@@ -96,9 +96,9 @@ struct ScoreOptions {
   double outlier_gate = 5.0;
 };
 
-// Linearises all factors of the segment at its own states and theta0, or at the
-// start that FindOffsetStart() finds (result.theta0), whitens
-// them, eliminates landmarks and keyframes, and scores every group of the rig.
+// Linearises all factors of the segment at its own states and theta0 (or, if it
+// does not fit, at what FindOffsetStart() finds: result.theta0), whitens them,
+// eliminates landmarks and keyframes, and scores every group of the rig.
 // The segment must be valid for the rig. Rows of Lambda and eta are zero for
 // components that the rig holds fixed. If the fit of the segment exceeds
 // kOrdinaryFit, both are divided by the square of the excess.

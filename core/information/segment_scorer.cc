@@ -95,15 +95,13 @@ void SegmentScorer::Score(const Rig& rig,
                           const ScoreOptions& options,
                           SegmentInformation* result) {
   if (!components_.Fits(rig)) components_ = RigComponents(rig);
+  ScoreAt(rig, theta0, segment, options, result);
+  if (result->residuals.fit <= kOrdinaryFit) return;
+  // Perhaps the states are those of a time offset that is far from the true
+  // one.
   const std::optional<OffsetStart> start =
-      std::ranges::count(components_.estimated_time_offsets(), 0) == 0
-          ? FindOffsetStart(rig, theta0, segment)
-          : std::nullopt;
-  if (start) {
-    ScoreAt(rig, start->theta, start->segment, options, result);
-  } else {
-    ScoreAt(rig, theta0, segment, options, result);
-  }
+      FindOffsetStart(rig, theta0, segment);
+  if (start) ScoreAt(rig, start->theta, start->segment, options, result);
 }
 
 void SegmentScorer::ScoreAt(const Rig& rig,
