@@ -215,17 +215,31 @@ bool EstimatesTimeOffset(const Rig& rig) {
   return false;
 }
 
+// The states of a SLAM system that ignores a rolling shutter are those of the
+// middle row. The candidate knows when that was, the rig perhaps not.
+bool IsOfMiddleRow(const Calibration& theta, double offset_s) {
+  constexpr double kTolerance_s = 5e-3;
+  return std::any_of(theta.cameras.begin(),
+                     theta.cameras.end(),
+                     [&](const CameraCalibration& camera) {
+                       return camera.line_delay_s &&
+                              std::abs(offset_s - MiddleRowDelay(camera)) <
+                                  kTolerance_s;
+                     });
+}
+
 // True if the finding biases the calibration. Lost, repeated and saturated
 // samples are noise in some segments, which their residuals show; a time offset
 // does not bias it if it is estimated.
-bool Biases(const Rig& rig, const Finding& finding) {
+bool Biases(const CheckContext& context, const Finding& finding) {
   switch (finding.kind) {
     case FindingKind::kDroppedSamples:
     case FindingKind::kRepeatedSamples:
     case FindingKind::kSaturation:
       return false;
     case FindingKind::kTimeOffset:
-      return !EstimatesTimeOffset(rig);
+      return !EstimatesTimeOffset(context.rig) &&
+             !IsOfMiddleRow(context.result.theta, finding.value);
     default:
       return true;
   }
@@ -244,7 +258,7 @@ void CheckPreflight(const CheckContext& context,
   std::string failure;
   std::string notes;
   for (const Finding& finding : context.evidence.diagnosis->findings) {
-    const bool biases = Biases(context.rig, finding);
+    const bool biases = Biases(context, finding);
     biasing += biases ? 1 : 0;
     std::string* text = biases ? &failure : &notes;
     *text += fmt::format("{}Preflight found {}: {}; {}.",

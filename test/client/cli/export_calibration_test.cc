@@ -171,8 +171,11 @@ TEST_F(CalibrationExport, WhatARigCannotTakeIsNamedAndStrictRefusesIt) {
   ASSERT_EQ(Selfcal(Line("kalibr")).code, 0);
   const fs::path imu = folder_ / "imu.yaml";
   std::string text = ReadBytes(imu);
-  const std::string zeros = "A:\n  - [0.0,";
-  text.replace(text.find(zeros), zeros.size(), "A:\n  - [0.1,");
+  // Positions of the axes of an accelerometer whose axes are not orthogonal.
+  const std::string zero = "\n  - [0.0,";
+  const std::size_t row = text.find(zero, text.find("accelerometers:"));
+  text.replace(row, zero.size(), "\n  - [0.01,");
+  text.insert(text.find("gyroscopes:"), "  rx_i: [0.01, 0, 0]\n");
   std::ofstream(imu) << text;
   std::vector<std::string> line = {"rig",
                                    "create",
@@ -184,7 +187,7 @@ TEST_F(CalibrationExport, WhatARigCannotTakeIsNamedAndStrictRefusesIt) {
                                    "again"};
   const Outcome told = Selfcal(line);
   EXPECT_EQ(told.code, 0);
-  EXPECT_THAT(told.err, HasSubstr("lost: gyroscopes.A: "));
+  EXPECT_THAT(told.err, HasSubstr("lost: accelerometers.M: "));
   line.push_back("--strict");
   const Outcome refused = Selfcal(line);
   EXPECT_EQ(refused.code, 2);

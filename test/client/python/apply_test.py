@@ -80,7 +80,9 @@ class ApplyTest(unittest.TestCase):
             )
             np.testing.assert_allclose(w_I, np.tile(rest[5], (4, 1)))
             np.testing.assert_allclose(
-                f_I, np.tile(rest[6], (4, 1)), atol=1e-11
+                np.broadcast_to(f_I, (4, 3)),
+                np.tile(rest[6], (4, 1)),
+                atol=1e-11,
             )
 
     def test_projects(self) -> None:

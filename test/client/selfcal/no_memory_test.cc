@@ -14,15 +14,17 @@
 namespace selfcal::client {
 namespace {
 
-// 30 keyframes, 6 to a segment, with ten samples and three landmarks each.
+// 30 keyframes, 6 to a segment, with ten samples and three landmarks each. The
+// samples after one keyframe suffice to close its segment.
 void Feed(const std::vector<KeyframeObservation>& seen,
           SegmentBuilder* builder) {
+  constexpr std::int64_t kStep_ns = 400'000'000;
   for (std::int64_t k = 0; k < 30; ++k) {
     for (std::int64_t i = 0; i < 10; ++i) {
-      builder->AddImu({1000 * k + 100 * i + 1});
+      builder->AddImu({kStep_ns * k + kStep_ns / 10 * i + 1});
     }
     KeyframeState state;
-    state.t_ns = 1000 * k + 500;
+    state.t_ns = kStep_ns * k + kStep_ns / 2;
     builder->AddKeyframe(state, seen);
   }
 }
