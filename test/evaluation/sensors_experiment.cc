@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdint>
-#include <stdexcept>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -157,7 +157,10 @@ struct Run {
   int degrees = 0;
 };
 
-Run RunOne(const Setting& setting, std::uint64_t seed, double duration_s) {
+// nullopt if it does not converge.
+std::optional<Run> RunOne(const Setting& setting,
+                          std::uint64_t seed,
+                          double duration_s) {
   Rig rig = setting.rig;
   rig.factory = PerturbCalibration(rig.factory, {}, seed);
   rig.groups = DefaultGroups(rig.blocks, rig.factory);
@@ -173,8 +176,7 @@ Run RunOne(const Setting& setting, std::uint64_t seed, double duration_s) {
   const CalibrationResult result =
       Calibrate(rig, rig.factory, session.segments, ComparedOptions());
   if (result.status != CalibrateStatus::kConverged && !setting.ignored) {
-    throw std::runtime_error(setting.name + ", seed " + std::to_string(seed) +
-                             ": " + result.message);
+    return std::nullopt;
   }
   // An ignored block is not a component.
   Calibration truth = setting.truth;
@@ -330,15 +332,24 @@ void RunSensors(Context* context) {
   ResultTable accuracy = AccuracyTable();
   std::vector<double> offsets, line_delays;
   for (const Setting& setting : Settings()) {
-    std::vector<Run> all(runs);
+    std::vector<std::optional<Run>> tried(runs);
     context->ForEach(runs, [&](int i) {
-      all[i] = RunOne(setting, setting.seed + i, duration_s);
+      tried[i] = RunOne(setting, setting.seed + i, duration_s);
     });
     context->Progress(setting.name);
+    std::vector<Run> all;
+    for (const std::optional<Run>& run : tried) {
+      if (run) all.push_back(*run);
+    }
+    context->AtMost("sensors.not_converged_" + setting.name,
+                    static_cast<double>(tried.size() - all.size()),
+                    0);
+    if (all.empty()) continue;
     AddConsistency(setting, all, &consistency);
     AddAccuracy(setting, all, &accuracy);
     if (setting.ignored) continue;
-    const auto [low, high] = NeesBounds(MeanDegrees(all), runs, 0.95);
+    const auto [low, high] =
+        NeesBounds(MeanDegrees(all), static_cast<int>(all.size()), 0.95);
     context->Within("sensors.nees_" + setting.name, MeanNees(all), low, high);
     const auto collect = [&](const char* pattern, std::vector<double>* to) {
       const std::vector<double> some = Normalised(
