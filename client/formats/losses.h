@@ -18,7 +18,7 @@ void AddImuLoss(const std::string& tool,
                 const ImuCalibration& imu,
                 std::vector<Loss>* losses);
 
-// For tools that correct readings, but not by these blocks: a loss unless they
+// A tool that corrects readings, but not by these blocks: a loss unless they
 // are absent or zero.
 void AddGSensitivityLoss(const std::string& tool,
                          const ImuCalibration& imu,
@@ -36,7 +36,7 @@ void AddSharedOffsetLosses(const std::string& tool,
                            const Calibration& theta,
                            std::vector<Loss>* losses);
 
-// For tools that expose an image at one time.
+// A tool that exposes an image at one time.
 void AddLineDelayLosses(const std::string& tool,
                         const Calibration& theta,
                         std::vector<Loss>* losses);

@@ -15,7 +15,7 @@ namespace {
 // Steps at each scale of the residuals, and the ratio of two scales.
 constexpr int kSteps = 3;
 constexpr double kNextScale = 0.6;
-// Of the direction from which a refinement begins: distant points do not
+// Sigma of the direction from which a refinement begins: distant points do not
 // determine it.
 constexpr double kDirectionSigma_rad = 0.3;
 constexpr double kMadToSigma = 1.4826;
@@ -188,7 +188,7 @@ EpipolarFit CheckEpipolar(const std::vector<RayPair>& pairs,
   const double fine_px = options.max_distance_px / 2;
   Fitter fitter(pairs, q_BA, options);
   if (t_B) {
-    // With a wrong calibration matches are far from their planes.
+    // Matches are far from their planes if the calibration is wrong.
     fitter.set_direction(*t_B);
     fitter.Refine(std::max(coarse_px, 3 * fitter.RobustSigma()), fine_px);
   } else {

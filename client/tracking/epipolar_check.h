@@ -1,5 +1,5 @@
-// Which matches of points between two views agree with one motion of the
-// camera, of which the rotation is known approximately.
+// Finds the matches of points between two views that agree with one motion of
+// the camera, of which the rotation is known approximately.
 //
 // Rays a and b of a point, in the frames A and B of the two views, and the
 // direction t of the origin of A in B lie in one plane, t . (R_BA a x b) = 0.

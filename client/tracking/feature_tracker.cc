@@ -19,7 +19,7 @@ constexpr double kMinBaseline_m = 1e-3;
 // A point that another camera did not find is looked for again after so many
 // images.
 constexpr std::uint64_t kMatchAgain = 10;
-// Of the images in which patches are aligned.
+// Smoothing of the images in which patches are aligned.
 constexpr double kSmoothing_px = 0.8;
 // A patch that appears larger or smaller by more begins anew.
 constexpr double kMaxStretch = 1.8;

@@ -59,7 +59,7 @@ struct TrackPoint {
   Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
 };
 
-// How many points the last images lost, for diagnosis.
+// Numbers of points that the last images lost, for diagnosis.
 struct TrackingCounts {
   int followed = 0;         // points that were to be followed
   int lost = 0;             // not found, or not the way back

@@ -1,4 +1,4 @@
-// Where the patches about points of one image are in another: pyramidal
+// Finds the patches about points of one image in another: pyramidal
 // Lucas-Kanade from a prediction, confirmed backwards.
 //
 // Functions without state, callable from any thread; OpenCV may use threads of

@@ -80,7 +80,7 @@ class LandmarkScene {
   std::span<const KeyframeState> keyframes_;
   const KeyframeMotions& motions_;
   double pixel_sigma_px_;
-  // Keyframe by keyframe; of a rolling shutter, its first row.
+  // Keyframe by keyframe; not used for a rolling shutter.
   std::vector<CameraPose> poses_;
 };
 

@@ -37,7 +37,7 @@ class ChainRecord {
   const double* Product(const Step& step) const {
     return &products_[step.product];
   }
-  // Of a step that is linked.
+  // The link of a step that has one.
   ChainTransition Link(const Step& step) const {
     const double* G = &transitions_[step.transition];
     return {columns_, G, G + chain::kState * columns_.stride};

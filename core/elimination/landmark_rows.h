@@ -32,7 +32,8 @@ struct LandmarkRows {
   // Doubles from one row to the next: whole vectors of any width.
   constexpr int stride() const { return (residual() + 1 + 7) / 8 * 8; }
 
-  // Where a row has a shared parameter, and whether with the opposite sign.
+  // The place of a shared parameter in a row, and whether it has the opposite
+  // sign there.
   constexpr int Column(int parameter) const {
     return IsNegative(parameter) ? kRowsTurn + parameter
                                  : kRowsOwn + own() - shared + parameter;

@@ -30,7 +30,7 @@
 
 namespace selfcal::preintegration {
 
-// What forces at one instant of a step depend on; all in the frame of the body.
+// The rates and forces at one instant of a step; all in the frame of the body.
 template <typename T>
 struct StageForce {
   Vector3<T> w;
@@ -38,7 +38,7 @@ struct StageForce {
   Matrix3<T> S;
 };
 
-// At the beginning, the middle and the end of a step.
+// Forces at the beginning, the middle and the end of a step.
 template <typename T>
 struct StepForces {
   StepForces(const CoupledImuModel<T>& imu,
@@ -157,7 +157,7 @@ CoupledRateResponse<T> RespondToCoupledRates(const Stage<T>& s,
   for (int j = 0; j < 3; ++j) {
     C.row(j) = imu.positions.col(j).cross(imu.accel_by_f.row(j).transpose());
   }
-  // For a difference of one between the ends.
+  // The response to a difference of one between the ends.
   const Matrix3<T> v_by_dw =
       (-1.0 / 6) * (L_0 + 4.0 * L_m + L_1).lazyProduct(C);
   const Matrix3<T> p_by_dw = -sixth * (L_0 + 2.0 * L_m).lazyProduct(C);
@@ -240,7 +240,8 @@ class CoupledJacobians {
                      imu.accel_by_f.lazyProduct(forces.end.S));
   }
 
-  // As in MotionJacobians; the accelerometer's through its forces alone.
+  // The same as in MotionJacobians; the accelerometer's through its forces
+  // alone.
   GyroResponse<T> ByGyro(const Matrix3<T>& T_g_inverse) const {
     return {psi_.template leftCols<3>().lazyProduct(T_g_inverse),
             v_.template leftCols<3>().lazyProduct(T_g_inverse),

@@ -27,7 +27,7 @@ using InertialMatrix = Eigen::Matrix<double, 15, 15>;
 struct InertialJacobians {
   InertialMatrix x0;  // with respect to the first state, 15
   InertialMatrix x1;  // to the second
-  // To theta_i.
+  // The derivative with respect to theta_i.
   Eigen::Matrix<double, 15, Eigen::Dynamic, 0, 15, kMaxImuTangentSize> theta;
 };
 

@@ -134,7 +134,7 @@ class InertialBatch {
                     double gravity_mps2,
                     const Function& run);
 
-  // Where the kernel writes W transitions of `out`.
+  // The places at which the kernel writes W transitions of `out`.
   template <int W>
   std::array<inertial::TransitionTarget, W> Targets(std::size_t first,
                                                     std::size_t n,

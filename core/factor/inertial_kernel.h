@@ -38,7 +38,7 @@ struct KernelInput {
   double gravity_mps2 = 0;
 };
 
-// Where the transition of a link is stored; G has the columns of
+// The place at which the transition of a link is stored; G has the columns of
 // KernelInput::columns.
 struct TransitionTarget {
   double* G;

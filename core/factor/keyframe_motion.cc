@@ -35,7 +35,7 @@ class Readings {
            const ImuCalibration& imu)
       : samples_(samples), x_(x), imu_(CorrectionOf(imu)) {}
 
-  // Of a reading, with the derivative of its rate.
+  // The force of a reading, given the derivative of its rate.
   Vector3d ForceAtOrigin(const CorrectedReading<double>& reading,
                          const Vector3d& dw) const {
     if (imu_.position_size == 0) return reading.f;

@@ -54,7 +54,7 @@ struct KeyframeMotion {
   Eigen::Vector3d shift_I = Eigen::Vector3d::Zero();  // [m], in I at t
   Eigen::Vector3d w_I = Eigen::Vector3d::Zero();      // [rad/s], in I there
   Eigen::Vector3d v_I = Eigen::Vector3d::Zero();      // [m/s], in I at t
-  // Of a rolling shutter; unused without.
+  // The motion after dt_s, used with a rolling shutter alone.
   ReadoutMotion readout = {};
 };
 

@@ -1,5 +1,7 @@
 #include "core/factor/reprojection_lanes.h"
 
+#include <type_traits>
+
 #include "core/model/so3_lanes.h"
 #include "core/simd/lanes.h"
 
@@ -102,48 +104,43 @@ struct RowPoses {
   }
 };
 
-// p_I at the exposure, times w.
+// Without a rolling shutter all rows have the pose of the run.
+struct RunPose {
+  RunPose(const RunGeometry&, const Batch&) {}
+  const Vector3& ToRows(const Vector3& p_run, T) const { return p_run; }
+};
 template <bool kRolling>
-Vector3 ToExposedBody(const RunGeometry& geometry, const Batch& batch) {
-  const Vector3 p_run = ToBody(geometry, batch);
-  if constexpr (kRolling) {
-    return RowPoses(geometry, batch).ToRows(p_run, batch.w);
-  } else {
-    return p_run;
-  }
-}
+using Poses = std::conditional_t<kRolling, RowPoses, RunPose>;
 
 // Residuals of a batch, with the derivatives with respect to p_I at the
 // exposure and in the frame of the run.
-template <class Model>
+template <class Model, bool kRolling>
 struct Evaluated {
+  Evaluated(const RunGeometry& geometry, const Batch& batch)
+      : rows(geometry, batch),
+        p_run(ToBody(geometry, batch)),
+        p_I(rows.ToRows(p_run, batch.w)) {}
+
+  Poses<kRolling> rows;
+  Vector3 p_run, p_I;
   LaneMask<kLanes> valid;
-  Vector3 p_I, p_run;
   Vector2 r_px;
   ProjectionParts<T, Model::kSize> parts;
   Matrix23 by_p_I, by_p_run;
 };
 
 template <bool kRolling, class Model>
-Evaluated<Model> Evaluate(const RunGeometry& geometry,
-                          const Model& model,
-                          const Batch& batch) {
-  Evaluated<Model> e;
-  e.p_run = ToBody(geometry, batch);
-  e.p_I = e.p_run;
-  Matrix3 R;
-  if constexpr (kRolling) {
-    const RowPoses rows(geometry, batch);
-    R = rows.R;
-    e.p_I = rows.ToRows(e.p_run, batch.w);
-  }
+Evaluated<Model, kRolling> Evaluate(const RunGeometry& geometry,
+                                    const Model& model,
+                                    const Batch& batch) {
+  Evaluated<Model, kRolling> e(geometry, batch);
   Vector2 z_px;
   e.valid = model.template Project<T>(
       geometry.pixels, ToCamera(geometry, e.p_I, batch.w), &z_px, &e.parts);
   e.r_px = Vector2(z_px[0] - batch.z_px[0], z_px[1] - batch.z_px[1]);
   e.by_p_I = Times(e.parts.point, geometry.R_CI);
   e.by_p_run = e.by_p_I;
-  if constexpr (kRolling) e.by_p_run = e.by_p_I * R.transpose();
+  if constexpr (kRolling) e.by_p_run = e.by_p_I * e.rows.R.transpose();
   return e;
 }
 
@@ -157,25 +154,16 @@ void SetTurn(const Matrix23& by_p, int r, const Vector3& p, Columns columns) {
   columns[2] = x * p[1] - y * p[0];
 }
 
-// Derivative of row r with respect to the time of the exposure, `turn` that
-// with respect to the rotation of the body then.
-template <class Model>
-T ByTime(const RunGeometry& geometry,
-         const RowPoses& rows,
-         const Evaluated<Model>& e,
-         T w,
-         int r,
-         const T* turn) {
-  const Vector3 rate =
-      RightJacobian<T>(rows.phi) * SlopeAt(rows.s, geometry.turn);
-  const Vector3 v = SlopeAt(rows.s, geometry.shift);
-  T by_turn = 0.0, by_shift = 0.0;
-  for (int c = 0; c < 3; ++c) {
-    by_turn = by_turn + turn[c] * rate[c];
-    by_shift = by_shift + e.by_p_run(r, c) * v[c];
-  }
-  return geometry.rate_share * by_turn - w * by_shift;
-}
+// Rate and velocity of the body at the exposures of rows, as they count in
+// derivatives: the rate in the frame there, the velocity in that of the run.
+struct RowRates {
+  Vector3 w, v;
+
+  RowRates(const RunGeometry& geometry, const RowPoses& rows)
+      : w(geometry.rate_share *
+          (RightJacobian<T>(rows.phi) * SlopeAt(rows.s, geometry.turn))),
+        v(SlopeAt(rows.s, geometry.shift)) {}
+};
 
 // Stores the part of `values` that belongs to the run.
 void StorePart(T values, int first, int count, double* to) {
@@ -206,7 +194,7 @@ void ReprojectionLanes<W, Model, kRolling>::Linearise(
   constexpr int kOffset = kPixels + 4 + Model::kSize;
   for (int first = 0; first < run.count; first += W) {
     const Batch batch = Gather(run, points, first);
-    const Evaluated<Model> e = Evaluate<kRolling>(geometry, model, batch);
+    const auto e = Evaluate<kRolling>(geometry, model, batch);
     T weight = 1 / sigma_px;
     if (weights != nullptr) {
       for (int i = 0; i < W; ++i) {
@@ -231,8 +219,13 @@ void ReprojectionLanes<W, Model, kRolling>::Linearise(
         T turn[3];
         SetTurn(e.by_p_I, r, e.p_I, turn);
         for (int c = 0; c < 3; ++c) columns[kRows.Column(c)] = -turn[c];
-        const RowPoses rows(geometry, batch);
-        columns[kOffset] = ByTime(geometry, rows, e, batch.w, r, turn);
+        const RowRates rates(geometry, e.rows);
+        T by_time = 0.0;
+        for (int c = 0; c < 3; ++c) {
+          by_time = by_time + turn[c] * rates.w[c] -
+                    batch.w * (e.by_p_run(r, c) * rates.v[c]);
+        }
+        columns[kOffset] = by_time;
         columns[kOffset + 1] = batch.z_px[1] * columns[kOffset];
       } else {
         T by_offset = 0.0;
@@ -269,7 +262,7 @@ void ReprojectionLanes<W, Model, kRolling>::AddLandmarkSums(
   const double inverse_sigma = 1 / sigma_px;
   for (int first = 0; first < run.count; first += W) {
     const Batch batch = Gather(run, points, first);
-    const Evaluated<Model> e = Evaluate<kRolling>(geometry, model, batch);
+    const auto e = Evaluate<kRolling>(geometry, model, batch);
     const Matrix23 by_X = Times(e.by_p_run, geometry.R_IG);
     const T square = e.r_px[0] * e.r_px[0] + e.r_px[1] * e.r_px[1];
     StorePart(Select(e.valid, square, T(-1.0)), first, run.count, squares_px2);
@@ -308,12 +301,11 @@ void ReprojectionLanes<W, Model, kRolling>::Squares(const RunGeometry& geometry,
                                                     double* squares_px2) {
   for (int first = 0; first < run.count; first += W) {
     const Batch batch = Gather(run, points, first);
+    const Poses<kRolling> rows(geometry, batch);
+    const Vector3 p_I = rows.ToRows(ToBody(geometry, batch), batch.w);
     Vector2 z_px;
     const auto valid = model.template Project<T>(
-        geometry.pixels,
-        ToCamera(geometry, ToExposedBody<kRolling>(geometry, batch), batch.w),
-        &z_px,
-        nullptr);
+        geometry.pixels, ToCamera(geometry, p_I, batch.w), &z_px, nullptr);
     const T x = z_px[0] - batch.z_px[0];
     const T y = z_px[1] - batch.z_px[1];
     StorePart(

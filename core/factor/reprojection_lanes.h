@@ -17,9 +17,8 @@ struct RunGeometry {
   double
       by_offset[6];  // derivative of the pose with respect to the time offset
   PixelMap pixels;
-  // Of a rolling shutter: ReadoutMotion, its matrices by columns; and when the
-  // first row is exposed, and how long after it the next, from the time of that
-  // motion on.
+  // A rolling shutter has more: the ReadoutMotion, its matrices by columns; the
+  // time of the first row, from that of the motion on; and the line delay.
   double turn[9];
   double shift[9];
   double rate_share;

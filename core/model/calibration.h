@@ -30,7 +30,8 @@ inline constexpr int kGyroMisalignment = kGyroScale + 3;
 inline constexpr int kAccelScale = kGyroMisalignment + 3;
 inline constexpr int kAccelMisalignment = kAccelScale + 3;
 inline constexpr int kAccelRotation = kAccelMisalignment + 3;
-// Of an IMU without optional blocks, which follow, and with all of them.
+// Sizes of the tangent of an IMU without optional blocks, which follow, and
+// with all of them.
 inline constexpr int kImuTangentSize = kAccelRotation + 3;
 inline constexpr int kMaxImuTangentSize = kImuTangentSize + 9 + 9;
 // Offset of each block in a camera's tangent.
@@ -59,7 +60,8 @@ struct ImuCalibration {
   Eigen::Quaterniond q_AI = Eigen::Quaterniond::Identity();
   // T_s, 9, row by row [rad/s per m/s^2]; without it, zero.
   OptionalVector gyro_g_sensitivity;
-  // In I [m]: 3, of all axes, or 9, of the axes x, y, z of A; without it, zero.
+  // Positions in I [m]: 3, of all axes, or 9, of the axes x, y, z of A; without
+  // it, zero.
   OptionalVector accel_position;
 
   // Upper triangular: scales on the diagonal, m = (m_x, m_y, m_z) at (0,1),

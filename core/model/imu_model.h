@@ -38,7 +38,7 @@ struct ImuCorrection {
   double T_g_inverse[9];
   double T_a_inverse[9];
   double R_IA[9];
-  // Of a coupled IMU.
+  // A coupled IMU has more.
   double T_s[9];
   double T_a[9];
   double accel_positions[9];  // columns r_x, r_y, r_z

@@ -30,7 +30,8 @@ constexpr ImuFullScale FullScale(double gyro_dps, double accel_g) {
           .accel_mps2 = kEndOfReadings * accel_g * kG_mps2};
 }
 
-// Of EuRoC (ADIS16448): for this part, and where nothing was published.
+// The walks of EuRoC (ADIS16448): this part, and those of which nothing was
+// published.
 constexpr double kEurocGyroWalk = 1.9393e-5;
 constexpr double kEurocAccelWalk = 3e-3;
 

@@ -59,8 +59,8 @@ struct BlockInfo {
   GradeTolerance tolerance = {};
   // If false, it is held constant unless the rig estimates it (BlockSetting).
   bool estimated = true;
-  // Of an optional vector: the numbers of components that it may have, the
-  // first of which it gets where it is added.
+  // The numbers of components that an optional vector may have, the first of
+  // which it gets where it is added.
   std::array<int, 2> sizes = {};
   StoredSince since = StoredSince::kNames;
 };

@@ -15,7 +15,8 @@ namespace selfcal {
 // wrong unit, or from a full scale that the rig does not state.
 inline constexpr double kMaxSaturatedFraction = 0.02;
 
-// Of all readings, or of those between keyframes, which no other segment has.
+// The readings are all of a segment, or those between its keyframes, which no
+// other segment has.
 std::size_t CountSaturatedReadings(std::span<const ImuSample> samples,
                                    const ImuFullScale& full_scale);
 

@@ -8,6 +8,7 @@
 
 #include "core/preflight/checks.h"
 #include "core/preflight/signed_permutation.h"
+#include "core/preflight/time_offset.h"
 #include "core/preflight/turns.h"
 
 namespace selfcal {
@@ -18,9 +19,6 @@ namespace {
 constexpr double kUnexplained = 0.5;
 constexpr double kGain = 3;
 
-// Smaller offsets do no harm that a recalibration could not correct, and look
-// like a SLAM system's own delays.
-constexpr double kMinOffset_s = 5e-3;
 constexpr double kOffsetSigmas = 6;
 
 struct Unit {
@@ -213,25 +211,11 @@ class GyroCheck {
          straight / best.with.share()});
   }
 
-  // Returns true if keyframes may be at times of the IMU's clock, or at times
-  // of the first or the middle row of images of a camera, whose times the
-  // calibration states.
-  bool Stated(double offset_s, double tolerance_s) const {
-    if (std::abs(offset_s) < tolerance_s) return true;
-    for (const CameraCalibration& camera : theta_.cameras) {
-      if (std::abs(offset_s - camera.time_offset_s) < tolerance_s ||
-          std::abs(offset_s - MiddleRowDelay(camera)) < tolerance_s) {
-        return true;
-      }
-    }
-    return false;
-  }
-
   void ReportOffset(const Candidate& best) {
     const OffsetFit& fit = best.offset;
     const double tolerance_s =
-        std::max(kMinOffset_s, kOffsetSigmas * fit.sigma_s);
-    if (Stated(fit.offset_s, tolerance_s)) return;
+        std::max(kLeastTimeOffset_s, kOffsetSigmas * fit.sigma_s);
+    if (IsStatedOffset(theta_, fit.offset_s, tolerance_s)) return;
     const std::string ms = Figure(1e3 * std::abs(fit.offset_s)) + " ms";
     const bool late = fit.offset_s > 0;
     diagnosis_->findings.push_back(

@@ -33,7 +33,7 @@ constexpr int kMinKeyframes = 30;
 // Observations of a landmark in a segment that say more than its position.
 constexpr int kMinTrack = 3;
 constexpr int kRounds = 5;
-// Of Tukey's weights, in robust standard deviations.
+// The limit of Tukey's weights, in robust standard deviations.
 constexpr double kTukey = 4.7;
 
 // An observation: its residual, and its derivatives with respect to a delay of

@@ -1,5 +1,6 @@
 #include "core/preflight/time_offset.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/preflight/motion_data.h"
@@ -14,6 +15,19 @@ constexpr double kMaxSigma_s = 1e-3;
 constexpr double kMaxRefinement_s = 2 * kCoarseStep_s;
 
 }  // namespace
+
+bool IsStatedOffset(const Calibration& theta,
+                    double offset_s,
+                    double tolerance_s) {
+  if (std::abs(offset_s) < tolerance_s) return true;
+  return std::any_of(
+      theta.cameras.begin(),
+      theta.cameras.end(),
+      [&](const CameraCalibration& camera) {
+        return std::abs(offset_s - camera.time_offset_s) < tolerance_s ||
+               std::abs(offset_s - MiddleRowDelay(camera)) < tolerance_s;
+      });
+}
 
 std::optional<TimeOffset> EstimateTimeOffset(
     const Calibration& theta, std::span<const MotionSegment> segments) {

@@ -23,21 +23,29 @@ namespace selfcal {
 // intervals at their ends are not used.
 inline constexpr double kMaxTimeOffset_s = 0.15;
 
-// Error of an offset that is reported [s]: what SLAM systems with a factory
-// calibration err by, in addition to 6 sigma of the fit.
-inline constexpr double kTimeOffsetError_s = 2e-3;
-
 struct TimeOffset {
   double offset_s = 0;  // the states hold this much later than their stamps
   double sigma_s = 0;   // of the fit: from the residuals of the rotations
 };
 
 // `theta` is the calibration that the SLAM system used; only its IMU matters.
-// nullopt if the offset is not determined: there are less than 10 intervals of
-// keyframes or they hardly turn, sigma is above 1 ms, the rates do not fit the
-// rotations at any offset (CheckGyro finds why), or the offset is outside the
-// range.
+// The error is at most 2 ms, by which SLAM systems with a factory calibration
+// err, and 6 sigma. nullopt if the offset is not determined: there are less
+// than 10 intervals of keyframes or they hardly turn, sigma is above 1 ms, the
+// rates do not fit the rotations at any offset (CheckGyro finds why), or the
+// offset is outside the range.
 std::optional<TimeOffset> EstimateTimeOffset(
     const Calibration& theta, std::span<const MotionSegment> segments);
+
+// Smaller offsets [s] do no harm that a recalibration could not correct, and
+// look like a SLAM system's own delays.
+inline constexpr double kLeastTimeOffset_s = 5e-3;
+
+// Whether a calibration explains states that hold this much later than their
+// stamps: those of the IMU's clock, or of the first or the middle row of the
+// images of a camera.
+bool IsStatedOffset(const Calibration& theta,
+                    double offset_s,
+                    double tolerance_s);
 
 }  // namespace selfcal

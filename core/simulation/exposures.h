@@ -19,9 +19,9 @@ class Exposures {
   // The state at the exposure of a row of a keyframe's image.
   using OfRow = std::function<KeyframeState(int keyframe, double row_px)>;
 
-  // Of a camera that exposes all rows at once.
+  // Adds a camera that exposes all rows at once.
   void AddCamera(std::vector<KeyframeState> states);
-  // Of one with a rolling shutter.
+  // Adds one with a rolling shutter.
   void AddCamera(OfRow of_row);
 
   KeyframeState At(int camera, int keyframe, double row_px) const {

@@ -171,7 +171,8 @@ class Tracker {
                  Eigen::Vector2d* z_px) const {
     const CameraCalibration& c = theta_.cameras[camera];
     double row_px = c.height_px / 2.0;
-    // Of a rolling shutter, the row at whose exposure the point is in that row.
+    // A rolling shutter sees the point in the row at whose exposure it is
+    // there.
     for (int i = 0; i < kMaxRowIterations; ++i) {
       const KeyframeState x = exposures.At(camera, keyframe_, row_px);
       const Eigen::Vector3d p_I = x.q_GI.conjugate() * (p_G - x.p_GI);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "core/preflight/time_offset.h"
 #include "server/pipeline/candidate_checks.h"
 
 namespace selfcal::server {
@@ -205,32 +206,13 @@ void CheckNoise(const CheckContext& context,
 }
 
 bool EstimatesTimeOffset(const Rig& rig) {
-  const std::vector<int> free = FreeComponents(rig);
-  for (int j = 0; j < static_cast<int>(rig.factory.cameras.size()); ++j) {
-    if (std::binary_search(
-            free.begin(), free.end(), TimeOffsetComponent(rig.factory, j))) {
-      return true;
-    }
-  }
-  return false;
-}
-
-// The states of a SLAM system that ignores a rolling shutter are those of the
-// middle row. The candidate knows when that was, the rig perhaps not.
-bool IsOfMiddleRow(const Calibration& theta, double offset_s) {
-  constexpr double kTolerance_s = 5e-3;
-  return std::any_of(theta.cameras.begin(),
-                     theta.cameras.end(),
-                     [&](const CameraCalibration& camera) {
-                       return camera.line_delay_s &&
-                              std::abs(offset_s - MiddleRowDelay(camera)) <
-                                  kTolerance_s;
-                     });
+  return std::ranges::count(EstimatedTimeOffsets(rig), 1) > 0;
 }
 
 // True if the finding biases the calibration. Lost, repeated and saturated
 // samples are noise in some segments, which their residuals show; a time offset
-// does not bias it if it is estimated.
+// does not bias it if it is estimated, or if the candidate explains it: states
+// of a SLAM system that ignores a rolling shutter are those of the middle row.
 bool Biases(const CheckContext& context, const Finding& finding) {
   switch (finding.kind) {
     case FindingKind::kDroppedSamples:
@@ -239,7 +221,8 @@ bool Biases(const CheckContext& context, const Finding& finding) {
       return false;
     case FindingKind::kTimeOffset:
       return !EstimatesTimeOffset(context.rig) &&
-             !IsOfMiddleRow(context.result.theta, finding.value);
+             !IsStatedOffset(
+                 context.result.theta, finding.value, kLeastTimeOffset_s);
     default:
       return true;
   }

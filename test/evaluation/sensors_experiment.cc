@@ -78,41 +78,50 @@ Setting RollingSetting(int readout_ms, Effect effect) {
   return setting;
 }
 
-// A poor gyroscope: 0.5 mrad/s for each m/s^2 on and across its axes.
-Setting GSensitivitySetting(Effect effect) {
+// A block of an IMU with these nine values in truth.
+Setting ImuSetting(const std::string& name,
+                   std::uint64_t seed,
+                   OptionalVector ImuCalibration::*block,
+                   const OptionalVector& value,
+                   const std::string& pattern,
+                   Effect effect) {
   Setting setting;
-  setting.name = "g_sensitivity_" + EffectName(effect);
-  setting.seed = 3000;
+  setting.name = name + "_" + EffectName(effect);
+  setting.seed = seed;
   setting.rig = RigOfCameras(1);
   setting.truth = setting.rig.factory;
-  OptionalVector& T_s = setting.truth.imu.gyro_g_sensitivity;
-  T_s.resize(9);
-  T_s << 5e-4, -3e-4, 2e-4, 1e-4, -4e-4, 3e-4, -2e-4, 5e-4, 4e-4;
-  OptionalVector& known = setting.rig.factory.imu.gyro_g_sensitivity;
-  if (effect == Effect::kKnown) known = T_s;
-  if (effect == Effect::kEstimated) known.setZero(9);
-  setting.rig.blocks = {
-      {"imu.gyro.g_sensitivity", effect == Effect::kEstimated}};
+  setting.truth.imu.*block = value;
+  OptionalVector& known = setting.rig.factory.imu.*block;
+  if (effect == Effect::kKnown) known = value;
+  if (effect == Effect::kEstimated) known.setZero(value.size());
+  setting.rig.blocks = {{pattern, effect == Effect::kEstimated}};
   setting.ignored = effect == Effect::kIgnored;
   return setting;
 }
 
+// A poor gyroscope: 0.5 mrad/s for each m/s^2 on and across its axes.
+Setting GSensitivitySetting(Effect effect) {
+  OptionalVector T_s(9);
+  T_s << 5e-4, -3e-4, 2e-4, 1e-4, -4e-4, 3e-4, -2e-4, 5e-4, 4e-4;
+  return ImuSetting("g_sensitivity",
+                    3000,
+                    &ImuCalibration::gyro_g_sensitivity,
+                    T_s,
+                    "imu.gyro.g_sensitivity",
+                    effect);
+}
+
 // The x axis of the accelerometer is in the origin, which it defines.
 Setting AccelPositionSetting(Effect effect) {
-  Setting setting;
-  setting.name = "accel_position_" + EffectName(effect);
-  setting.seed = 4000;
-  setting.rig = RigOfCameras(1);
-  setting.truth = setting.rig.factory;
-  OptionalVector& r = setting.truth.imu.accel_position;
-  r.resize(9);
+  OptionalVector r(9);
   r << 0, 0, 0, 0.03, -0.02, 0.01, -0.01, 0.02, 0.03;
-  OptionalVector& known = setting.rig.factory.imu.accel_position;
-  if (effect == Effect::kKnown) known = r;
-  if (effect == Effect::kEstimated) known.setZero(9);
-  setting.rig.blocks = {{"imu.accel.position", effect == Effect::kEstimated}};
+  Setting setting = ImuSetting("accel_position",
+                               4000,
+                               &ImuCalibration::accel_position,
+                               r,
+                               "imu.accel.position",
+                               effect);
   setting.rig.fixed = {"imu.accel.position.x.*"};
-  setting.ignored = effect == Effect::kIgnored;
   return setting;
 }
 

@@ -1,5 +1,5 @@
-// How the time of the score grows with threads, keyframes, observations and a
-// rolling shutter, and what wider vectors gain.
+// Growth of the time of the score with threads, keyframes, observations and a
+// rolling shutter, and the gain of wider vectors.
 #include <fmt/format.h>
 
 #include <string>

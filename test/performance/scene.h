@@ -20,7 +20,8 @@ struct SceneOptions {
   // Keyframes; and of new tracks, landmarks that were seen before.
   int max_track_length = 1'000'000;
   double revisit_fraction = 0.1;
-  // Of a rolling shutter, whose line delay is estimated; 0: a global one.
+  // Readout of a rolling shutter, whose line delay is estimated; 0: a global
+  // one.
   double readout_s = 0;
 };
 

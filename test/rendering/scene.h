@@ -62,7 +62,7 @@ Scene MakeRoom(const Trajectory& trajectory,
                const SceneOptions& options,
                std::uint64_t seed);
 
-// Where a ray meets the scene.
+// The point at which a ray meets the scene.
 struct Hit {
   int surface = 0;
   double distance_m = 0;

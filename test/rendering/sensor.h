@@ -1,4 +1,4 @@
-// What a camera's sensor makes of radiance: vignetting, gain, shot and read
+// A camera's sensor turns radiance into pixels: vignetting, gain, shot and read
 // noise, 8 bits.
 //
 // Pure functions, callable from any thread. The noise of a pixel follows from

@@ -41,7 +41,7 @@ TEST(Texture, InterpolatesLinearlyAndRepeats) {
   const Texture texture(1, 1, {10, 20, 30, 40});
   EXPECT_FLOAT_EQ(texture.At(2.75F, 2.5F, 0), 12.5F);
   EXPECT_FLOAT_EQ(texture.At(3, 3, 0), 25);
-  // Between the last column and the first one of the next period.
+  // This is between the last column and the first one of the next period.
   EXPECT_FLOAT_EQ(texture.At(4, 2.5F, 0), 15);
   EXPECT_FLOAT_EQ(texture.At(2.9F, 3.2F, 0), texture.At(8.9F, 11.2F, 0));
 }

@@ -259,7 +259,7 @@ TEST_F(CalibrationTest, CanBeMadeOfTheSameValues) {
   }
   selfcal_calibration_destroy(made);
 
-  // With the optional parts of an IMU.
+  // The optional parts of an IMU are kept.
   imu.gyro_g_sensitivity_size = 9;
   imu.gyro_g_sensitivity[5] = 2e-4;
   imu.accel_position_size = 3;

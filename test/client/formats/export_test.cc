@@ -218,7 +218,7 @@ TEST_P(Export, ReadsBackAsItWas) {
     ASSERT_TRUE(files.ok()) << files.status();
     const auto again = ImportRig(GetParam().format, files->files, kOptions);
     ASSERT_TRUE(again.ok()) << again.status();
-    // What a format does not have is said to be missing when it is read.
+    // The parts that a format lacks are said to be missing when it is read.
     std::vector<std::string> missing;
     for (std::size_t j = 0; j < rig.factory.cameras.size(); ++j) {
       if (!GetParam().poses)

@@ -218,7 +218,7 @@ std::vector<TextFile> BasaltFiles(RandomValues* random) {
   return {{"calibration.json", text}};
 }
 
-// As camera_calibration writes the cameras of a stereo rig.
+// The cameras of a stereo rig as camera_calibration writes them.
 std::vector<TextFile> CameraInfoFiles() {
   const std::string left =
       "image_width: 752\nimage_height: 480\ncamera_name: narrow_stereo/left\n"
@@ -254,7 +254,7 @@ std::vector<TextFile> Files(const std::string& format, RandomValues* random) {
   return BasaltFiles(random);
 }
 
-// What a format does not have, in its files above.
+// The parts that a format lacks in its files above.
 std::vector<std::string> Missing(const std::string& format) {
   if (format != "camera_info") return {};
   return {"cam0.extrinsics", "cam1.extrinsics", "imu_noise"};

@@ -157,7 +157,7 @@ Tool Kalibr(const std::vector<TextFile>& files) {
       for (int i = 0; i < 3; ++i) r(i, axis) = node[i].as<double>();
     }
   }
-  // At a constant rate. Its forces are at the origin, so that A is exact only
+  // The rate is constant. Its forces are at the origin, so that A is exact only
   // where r is zero.
   tool.correct = [=](const Vector3d& gyro, const Vector3d& accel) -> ToolRates {
     const Vector3d read = Ma.inverse() * accel;

@@ -633,7 +633,7 @@ TEST_F(RegularStream, SendsTheSamplesFromAStateBeforeItsImageOn) {
     state.t_ns = (100 * k - 30) * kMs;
     ASSERT_TRUE(builder_.AddKeyframe(state, 100 * k * kMs, {}));
   }
-  // From 150 ms before the states, at 70 and 570 ms.
+  // Samples begin 150 ms before the states, which are at 70 and 570 ms.
   for (const auto& [keyframe_ms, begin_ms] :
        std::vector<std::pair<std::int64_t, std::int64_t>>{{100, 0},
                                                           {600, 400}}) {

@@ -87,7 +87,8 @@ TEST(EpipolarCheck, CorrectsARotationThatIsWrong) {
     EXPECT_GE(std::count(fit.inliers.begin() + 30, fit.inliers.end(), 1), 118)
         << seed;
   }
-  // Of 0.005: a small rotation looks much like a translation.
+  // Less than half of 0.005 is left: a small rotation looks much like a
+  // translation.
   EXPECT_LT(error_rad, 0.002);
 }
 

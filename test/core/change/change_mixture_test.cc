@@ -53,7 +53,7 @@ TEST_F(ChangeMixtureTest, IsCalibratedOverItsPrior) {
     ChangeMixture mixture;
     mixture.Add(L, s, by_change, kChanged);
     const ChangeDoubt doubt = mixture.Doubt();
-    // In two steps: g++ 12 takes a temporary of one for used after its end.
+    // Two steps: g++ 12 takes a temporary of one for used after its end.
     VectorXd error = by_change * y;
     error -= doubt.step;
     claimed += doubt.probability;

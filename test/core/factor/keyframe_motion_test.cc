@@ -148,7 +148,7 @@ TEST(MeasureMotion, MovesThePoseToEachRowOfARollingShutter) {
                 1e3 * readout_s,
                 worst_px,
                 worst_at_rates_px);
-    // Over twice the time of MovesThePoseToTheExposure.
+    // It is integrated over twice the time of MovesThePoseToTheExposure.
     EXPECT_LT(worst_px, 0.05);
   }
 }

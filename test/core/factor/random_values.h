@@ -51,7 +51,7 @@ class RandomValues {
     return imu;
   }
 
-  // With any of the optional blocks, at least one.
+  // An IMU with any of the optional blocks, at least one.
   ImuCalibration CoupledImu() {
     constexpr int kPositions[] = {0, 3, 9, 3, 9};
     const int kind = Index(5);

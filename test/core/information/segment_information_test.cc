@@ -73,8 +73,8 @@ TEST(ScoreSegment, DoesNotDependOnThePaddingWithoutATimeOffset) {
     MotionSegment bare = padded;
     const auto from_first = SamplesFromFirstKeyframe(padded);
     const auto between = SamplesBetweenKeyframes(padded);
-    // With the neighbours after its last keyframe that a segment always had, if
-    // another followed.
+    // A segment that another followed always had these neighbours after its
+    // last keyframe.
     bare.imu.assign(from_first.begin(),
                     from_first.begin() + between.size() + 8);
     ASSERT_LT(bare.imu.size(), padded.imu.size());

@@ -36,7 +36,7 @@ TEST(KeyframeState, BoxPlusTurnsOnTheRightAndAddsTheRest) {
   }
 }
 
-// By looking at each sample.
+// The expectation looks at each sample.
 TEST(SamplesBetweenKeyframes, AreThoseThatNoOtherSegmentHas) {
   MotionSegment segment;
   for (int t = 0; t < 100; t += 5) segment.imu.push_back({t});

@@ -13,6 +13,9 @@
 namespace selfcal {
 namespace {
 
+// The error that the header states, beside 6 sigma.
+constexpr double kTimeOffsetError_s = 2e-3;
+
 // Segments of a SLAM system with a factory calibration, that assumes no time
 // offset where there is one.
 std::vector<MotionSegment> Segments(double offset_s,
