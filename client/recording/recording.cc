@@ -7,6 +7,8 @@
 #include <map>
 #include <system_error>
 
+#include "client/recording/bag_files.h"
+#include "client/recording/bag_recording.h"
 #include "client/recording/csv_folder.h"
 #include "client/recording/euroc_folder.h"
 
@@ -62,13 +64,13 @@ absl::StatusOr<std::unique_ptr<Recording>> OpenRecording(
     return absl::NotFoundError(
         fmt::format("{}: there is no such file or folder", path));
   }
-  (void)options;
+  if (!fs::is_directory(status)) return OpenBag(path, options);
   if (IsEurocFolder(path)) return OpenEurocFolder(path);
   if (IsCsvFolder(path)) return OpenCsvFolder(path);
-  return absl::InvalidArgumentError(
-      fmt::format("{}: not a recording: neither mav0 nor cam0.csv is in the "
-                  "folder",
-                  path));
+  if (IsBagFolder(path)) return OpenBag(path, options);
+  return absl::InvalidArgumentError(fmt::format(
+      "{}: not a recording: the folder has neither mav0 nor cam0.csv nor a bag",
+      path));
 }
 
 }  // namespace selfcal::client

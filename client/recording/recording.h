@@ -2,6 +2,8 @@
 //
 //   folder of EuRoC's format (Burri et al. 2016), TUM-VI's included
 //   folder of images with cam0.csv, cam1.csv, ... and imu.csv
+//   bag of ROS 1
+//   bag of ROS 2, in MCAP or SQLite: a file, or the folder with metadata.yaml
 //
 // Lists of times and readings are read at once, images when they are asked for,
 // so that a recording of any length needs little memory. docs/recordings.md
@@ -79,7 +81,8 @@ struct ImageSet {
 // All images, in order of time.
 std::vector<ImageSet> ImageSets(const Recording& recording);
 
-// Topics of a bag. Those that are not stated are found by their types.
+// Topics of a bag. Those that are not stated are found by their types: each
+// topic of images is a camera, in the order of their names.
 struct RecordingOptions {
   std::vector<std::string> camera_topics;  // in the order of the cameras
   std::string imu_topic;
