@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 #include <png.h>
 
-#include <cstdio>
-#include <memory>
+#include <cstring>
 #include <stdexcept>
+#include <vector>
 
 namespace selfcal::client {
 namespace {
@@ -19,15 +19,22 @@ namespace {
 
 void IgnoreWarning(png_structp /*png*/, png_const_charp /*message*/) {}
 
+void ReadBytes(png_structp png, png_bytep target, std::size_t size) {
+  auto& rest = *static_cast<std::string_view*>(png_get_io_ptr(png));
+  if (rest.size() < size) throw std::runtime_error("Read Error");
+  std::memcpy(target, rest.data(), size);
+  rest.remove_prefix(size);
+}
+
 class Decoder {
  public:
-  explicit Decoder(std::FILE* file) {
+  explicit Decoder(std::string_view bytes) : rest_(bytes) {
     png_ = png_create_read_struct(
         PNG_LIBPNG_VER_STRING, nullptr, ThrowError, IgnoreWarning);
     if (png_ != nullptr) info_ = png_create_info_struct(png_);
     if (info_ == nullptr) throw std::runtime_error("no memory");
     png_set_user_limits(png_, kMaxImageSide_px, kMaxImageSide_px);
-    png_init_io(png_, file);
+    png_set_read_fn(png_, &rest_, ReadBytes);
   }
   ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
   Decoder(const Decoder&) = delete;
@@ -49,13 +56,17 @@ class Decoder {
     image.width_px = static_cast<int>(png_get_image_width(png_, info_));
     image.height_px = static_cast<int>(png_get_image_height(png_, info_));
     const auto width = static_cast<std::size_t>(image.width_px);
+    const auto height = static_cast<std::size_t>(image.height_px);
+    if (width * height > kMaxImagePixels) {
+      throw std::runtime_error("too many pixels");
+    }
     if (png_get_rowbytes(png_, info_) != width) {
       throw std::runtime_error("pixels that are not grey");
     }
-    image.pixels.resize(width * static_cast<std::size_t>(image.height_px));
+    image.pixels.resize(width * height);
     std::vector<png_bytep> rows;
-    for (int v = 0; v < image.height_px; ++v) {
-      rows.push_back(image.pixels.data() + static_cast<std::size_t>(v) * width);
+    for (std::size_t v = 0; v < height; ++v) {
+      rows.push_back(image.pixels.data() + v * width);
     }
     png_read_image(png_, rows.data());
     png_read_end(png_, nullptr);
@@ -63,23 +74,18 @@ class Decoder {
   }
 
  private:
+  std::string_view rest_;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;
 };
 
 }  // namespace
 
-absl::StatusOr<GreyPixels> ReadPng(const std::string& path) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
-      std::fopen(path.c_str(), "rb"), std::fclose);
-  if (!file) {
-    return absl::NotFoundError(fmt::format("{}: cannot be opened", path));
-  }
+absl::StatusOr<GreyPixels> DecodePng(std::string_view bytes) {
   try {
-    return Decoder(file.get()).Decode();
+    return Decoder(bytes).Decode();
   } catch (const std::exception& e) {
-    return absl::DataLossError(
-        fmt::format("{}: not a whole PNG: {}", path, e.what()));
+    return absl::DataLossError(fmt::format("not a whole PNG: {}", e.what()));
   }
 }
 

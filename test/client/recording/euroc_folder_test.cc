@@ -1,5 +1,6 @@
 #include "client/recording/euroc_folder.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "client/recording/recording.h"
 #include "client/tracking/feature_tracker.h"
 #include "test/core/simulation/rigs.h"
 #include "test/recordings.h"
@@ -20,19 +22,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using testing::ElementsAre;
+
 // Tracks through all images of a recording that was opened.
-std::vector<TrackPoint> TrackAll(const EurocRecording& recording,
+std::vector<TrackPoint> TrackAll(Recording& recording,
                                  const Calibration& theta) {
   FeatureTracker tracker(theta, {});
-  for (const ImuSample& sample : recording.imu) tracker.AddImu(sample);
+  for (const ImuSample& sample : recording.imu()) tracker.AddImu(sample);
   std::vector<TrackPoint> all;
   for (const ImageSet& set : ImageSets(recording)) {
-    std::vector<GreyPixels> pixels(recording.cameras.size());
-    std::vector<cv::Mat> images(recording.cameras.size());
+    std::vector<GreyPixels> pixels(recording.cameras().size());
+    std::vector<cv::Mat> images(recording.cameras().size());
     for (std::size_t j = 0; j < images.size(); ++j) {
       if (set.images[j] < 0) continue;
-      const EurocCamera& camera = recording.cameras[j];
-      auto read = ReadImage(camera, camera.images[set.images[j]]);
+      auto read = recording.ReadImage(static_cast<int>(j), set.images[j]);
       EXPECT_TRUE(read.ok()) << read.status();
       if (!read.ok()) continue;
       pixels[j] = *std::move(read);
@@ -68,15 +71,15 @@ class EurocReader : public testing::Test {
     return copy_.path() / "mav0";
   }
   // Opens a copy in which a text of a file is replaced.
-  absl::StatusOr<EurocRecording> OpenWith(const std::string& file,
-                                          const std::string& from,
-                                          const std::string& to) {
+  absl::StatusOr<std::unique_ptr<Recording>> OpenWith(const std::string& file,
+                                                      const std::string& from,
+                                                      const std::string& to) {
     const fs::path path = Copy() / file;
     std::string text = ReadBytes(path);
     const std::size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos);
     WriteBytes(path, text.replace(at, from.size(), to));
-    return OpenEuroc(copy_.path());
+    return OpenRecording(copy_.path(), {});
   }
   static std::string Stamp(int image) {
     return std::to_string(kEurocEpoch_ns + rendered_->stamp_ns(image));
@@ -91,16 +94,17 @@ TempFolder* EurocReader::whole_ = nullptr;
 RenderedRecording* EurocReader::rendered_ = nullptr;
 
 TEST_F(EurocReader, WhatWasWrittenIsReadToTheBit) {
-  const auto recording = OpenEuroc(whole_->path());
+  const auto recording = OpenRecording(whole_->path(), {});
   ASSERT_TRUE(recording.ok()) << recording.status();
-  ASSERT_EQ(recording->cameras.size(), 2u);
+  ASSERT_EQ((*recording)->cameras().size(), 2u);
   for (int j = 0; j < 2; ++j) {
-    const EurocCamera& camera = recording->cameras[j];
+    const RecordedCamera& camera = (*recording)->cameras()[j];
     EXPECT_EQ(camera.name, "cam" + std::to_string(j));
-    ASSERT_EQ(camera.images.size(), rendered_->images());
+    ASSERT_EQ(camera.image_times_ns.size(), rendered_->images());
     for (int k = 0; k < rendered_->images(); ++k) {
-      EXPECT_EQ(camera.images[k].t_ns, kEurocEpoch_ns + rendered_->stamp_ns(k));
-      const auto pixels = ReadImage(camera, camera.images[k]);
+      EXPECT_EQ(camera.image_times_ns[k],
+                kEurocEpoch_ns + rendered_->stamp_ns(k));
+      const auto pixels = (*recording)->ReadImage(j, k);
       ASSERT_TRUE(pixels.ok()) << pixels.status();
       EXPECT_EQ(pixels->pixels, rendered_->Image(j, k).pixels);
     }
@@ -113,11 +117,11 @@ TEST_F(EurocReader, WhatWasWrittenIsReadToTheBit) {
     EXPECT_LT((camera.calibration->p_CI - truth.p_CI).norm(), 1e-9);
   }
   const auto& written = rendered_->imu().measured;
-  ASSERT_EQ(recording->imu.size(), written.size());
+  ASSERT_EQ((*recording)->imu().size(), written.size());
   for (std::size_t i = 0; i < written.size(); ++i) {
-    EXPECT_EQ(recording->imu[i].t_ns, kEurocEpoch_ns + written[i].t_ns);
-    EXPECT_EQ(recording->imu[i].gyro, written[i].gyro);
-    EXPECT_EQ(recording->imu[i].accel, written[i].accel);
+    EXPECT_EQ((*recording)->imu()[i].t_ns, kEurocEpoch_ns + written[i].t_ns);
+    EXPECT_EQ((*recording)->imu()[i].gyro, written[i].gyro);
+    EXPECT_EQ((*recording)->imu()[i].accel, written[i].accel);
   }
 }
 
@@ -125,20 +129,55 @@ TEST_F(EurocReader, ImagesOfOneTimeBelongTogether) {
   const auto recording =
       OpenWith("cam1/data.csv", Stamp(1) + "," + Stamp(1) + ".png\n", "");
   ASSERT_TRUE(recording.ok()) << recording.status();
-  const std::vector<ImageSet> sets = ImageSets(*recording);
+  const std::vector<ImageSet> sets = ImageSets(**recording);
   ASSERT_EQ(sets.size(), rendered_->images());
   EXPECT_EQ(sets[0].images, std::vector<int>({0, 0}));
   EXPECT_EQ(sets[1].images, std::vector<int>({1, -1}));
   EXPECT_EQ(sets[2].images, std::vector<int>({2, 1}));
 }
 
-TEST_F(EurocReader, StampsOutOfOrderAreReportedWithTheirLine) {
+TEST_F(EurocReader, StampsOutOfOrderAreSorted) {
+  const std::string first = Stamp(1) + "," + Stamp(1) + ".png\n";
+  const std::string second = Stamp(2) + "," + Stamp(2) + ".png\n";
+  const auto recording =
+      OpenWith("cam0/data.csv", first + second, second + first);
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  const auto whole = OpenRecording(whole_->path(), {});
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  EXPECT_EQ((*recording)->cameras()[0].image_times_ns,
+            (*whole)->cameras()[0].image_times_ns);
+  for (int k = 0; k < 4; ++k) {
+    EXPECT_EQ((*recording)->ReadImage(0, k)->pixels,
+              (*whole)->ReadImage(0, k)->pixels);
+  }
+  EXPECT_THAT((*recording)->problems(),
+              ElementsAre(copy_.File("mav0/cam0/data.csv") + ": 1 of " +
+                          std::to_string(rendered_->images()) +
+                          " images are earlier than one before them: sorted "
+                          "by time"));
+}
+
+TEST_F(EurocReader, SecondImageOfOneTimeIsLeftOut) {
   const auto recording = OpenWith(
-      "cam0/data.csv", Stamp(2) + "," + Stamp(2), Stamp(0) + "," + Stamp(2));
-  EXPECT_EQ(recording.status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(recording.status().message(),
-            copy_.File("mav0/cam0/data.csv") + ": line 4: the timestamp " +
-                Stamp(0) + " is not later than " + Stamp(1) + " before it");
+      "cam0/data.csv", Stamp(2) + "," + Stamp(2), Stamp(1) + "," + Stamp(2));
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  const int images = rendered_->images();
+  EXPECT_EQ((*recording)->cameras()[0].image_times_ns.size(), images - 1);
+  EXPECT_EQ((*recording)->ReadImage(0, 1)->pixels,
+            rendered_->Image(0, 1).pixels);
+  EXPECT_THAT((*recording)->problems(),
+              ElementsAre(copy_.File("mav0/cam0/data.csv") + ": 1 of " +
+                          std::to_string(images) +
+                          " images have the timestamp of another one: left "
+                          "out"));
+}
+
+TEST_F(EurocReader, NamesMayLackTheirExtension) {
+  const auto recording = OpenWith("cam0/data.csv", Stamp(0) + ".png", Stamp(0));
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  EXPECT_TRUE((*recording)->problems().empty());
+  EXPECT_EQ((*recording)->ReadImage(0, 0)->pixels,
+            rendered_->Image(0, 0).pixels);
 }
 
 TEST_F(EurocReader, StampThatIsNotInNsIsReported) {
@@ -156,59 +195,70 @@ TEST_F(EurocReader, MissingImagesAreReportedAndLeftOut) {
   const fs::path first = camera / "data" / (Stamp(3) + ".png");
   fs::remove(first);
   fs::remove(camera / "data" / (Stamp(4) + ".png"));
-  const auto recording = OpenEuroc(copy_.path());
+  const auto recording = OpenRecording(copy_.path(), {});
   ASSERT_TRUE(recording.ok()) << recording.status();
-  ASSERT_EQ(recording->problems.size(), 1u);
-  EXPECT_EQ(recording->problems[0],
+  ASSERT_EQ((*recording)->problems().size(), 1u);
+  EXPECT_EQ((*recording)->problems()[0],
             copy_.File("mav0/cam1/data.csv") + ": 2 of " +
                 std::to_string(images) + " images are missing, " +
                 first.string() + " first");
-  EXPECT_EQ(recording->cameras[0].images.size(), images);
-  EXPECT_EQ(recording->cameras[1].images.size(), images - 2);
+  EXPECT_EQ((*recording)->cameras()[0].image_times_ns.size(), images);
+  EXPECT_EQ((*recording)->cameras()[1].image_times_ns.size(), images - 2);
   fs::remove_all(camera / "data");
-  EXPECT_EQ(OpenEuroc(copy_.path()).status().code(),
+  EXPECT_EQ(OpenRecording(copy_.path(), {}).status().code(),
             absl::StatusCode::kNotFound);
 }
 
 TEST_F(EurocReader, MissingListsAreReported) {
   const fs::path mav = Copy();
   fs::remove(mav / "imu0" / "data.csv");
-  auto recording = OpenEuroc(copy_.path());
+  auto recording = OpenRecording(copy_.path(), {});
   EXPECT_EQ(recording.status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(recording.status().message(),
             copy_.File("mav0/imu0/data.csv") + ": cannot be opened");
   fs::remove_all(mav / "cam0");
-  recording = OpenEuroc(copy_.path());
+  recording = OpenRecording(copy_.path(), {});
   EXPECT_EQ(recording.status().message(),
             mav.string() + ": there is no folder cam0");
-  EXPECT_FALSE(OpenEuroc(copy_.File("nowhere")).ok());
+  EXPECT_FALSE(OpenRecording(copy_.File("nowhere"), {}).ok());
 }
 
 TEST_F(EurocReader, LineThatIsCutOffIsReported) {
   const fs::path path = Copy() / "imu0" / "data.csv";
   WriteBytes(path, "#timestamp\n1000,1,2,3,4,5,6\r\n2000,1,2,3,4,5\n");
-  EXPECT_EQ(OpenEuroc(copy_.path()).status().message(),
+  EXPECT_EQ(OpenRecording(copy_.path(), {}).status().message(),
             path.string() + ": line 3: 6 values instead of 7");
   WriteBytes(path, "1000,1,2,3,4,5,6\n2000,1,2,3,nan,5,6\n");
-  EXPECT_EQ(OpenEuroc(copy_.path()).status().message(),
+  EXPECT_EQ(OpenRecording(copy_.path(), {}).status().message(),
             path.string() +
                 ": line 2: the reading 'nan' is not a finite "
                 "number");
   WriteBytes(path, "#timestamp\n");
-  EXPECT_EQ(OpenEuroc(copy_.path()).status().message(),
+  EXPECT_EQ(OpenRecording(copy_.path(), {}).status().message(),
             path.string() + ": lists nothing");
 }
 
 TEST_F(EurocReader, ImageOfAnotherSizeIsReported) {
   const fs::path path = Copy() / "cam0" / "data" / (Stamp(0) + ".png");
   ASSERT_TRUE(cv::imwrite(path, cv::Mat(240, 320, CV_8UC1, cv::Scalar(1))));
-  const auto recording = OpenEuroc(copy_.path());
+  const auto recording = OpenRecording(copy_.path(), {});
   ASSERT_TRUE(recording.ok()) << recording.status();
-  const EurocCamera& camera = recording->cameras[0];
-  const auto pixels = ReadImage(camera, camera.images[0]);
+  const auto pixels = (*recording)->ReadImage(0, 0);
   EXPECT_EQ(pixels.status().code(), absl::StatusCode::kDataLoss);
   EXPECT_EQ(pixels.status().message(),
             path.string() + ": 320 x 240 px instead of the 752 x 480 of cam0");
+}
+
+TEST_F(EurocReader, ImageThatIsRemovedOrCutLaterIsReported) {
+  const fs::path path = Copy() / "cam0" / "data" / (Stamp(0) + ".png");
+  const auto recording = OpenRecording(copy_.path(), {});
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  WriteBytes(path, ReadBytes(path).substr(0, 1000));
+  EXPECT_EQ((*recording)->ReadImage(0, 0).status().message(),
+            path.string() + ": not a whole PNG: Read Error");
+  fs::remove(path);
+  EXPECT_EQ((*recording)->ReadImage(0, 0).status().message(),
+            path.string() + ": cannot be opened");
 }
 
 TEST_F(EurocReader, BrokenSensorYamlIsReportedAndAMissingOneIsNot) {
@@ -217,17 +267,17 @@ TEST_F(EurocReader, BrokenSensorYamlIsReportedAndAMissingOneIsNot) {
             copy_.File("mav0/cam0/sensor.yaml") +
                 ": resolution is not a list of numbers");
   fs::remove(copy_.path() / "mav0" / "cam0" / "sensor.yaml");
-  recording = OpenEuroc(copy_.path());
+  recording = OpenRecording(copy_.path(), {});
   ASSERT_TRUE(recording.ok()) << recording.status();
-  EXPECT_FALSE(recording->cameras[0].calibration);
-  EXPECT_TRUE(recording->problems.empty());
+  EXPECT_FALSE((*recording)->cameras()[0].calibration);
+  EXPECT_TRUE((*recording)->problems().empty());
 }
 
 TEST_F(EurocReader, TracksOfFilesAreThoseOfTheirImages) {
-  const auto recording = OpenEuroc(whole_->path());
+  const auto recording = OpenRecording(whole_->path(), {});
   ASSERT_TRUE(recording.ok()) << recording.status();
   const Calibration& theta = rendered_->rig().factory;
-  const std::vector<TrackPoint> points = TrackAll(*recording, theta);
+  const std::vector<TrackPoint> points = TrackAll(**recording, theta);
   FeatureTracker tracker(theta, {});
   for (ImuSample sample : rendered_->imu().measured) {
     sample.t_ns += kEurocEpoch_ns;
@@ -253,15 +303,15 @@ TEST_F(EurocReader, TracksOfFilesAreThoseOfTheirImages) {
 
 TEST(EurocImages, RealImagesAreTracked) {
   SELFCAL_NEED_RECORDING(folder, "euroc_images");
-  const auto recording = OpenEuroc(folder);
+  const auto recording = OpenRecording(folder, {});
   ASSERT_TRUE(recording.ok()) << recording.status();
-  ASSERT_EQ(recording->cameras.size(), 2u);
+  ASSERT_EQ((*recording)->cameras().size(), 2u);
   Calibration theta;
-  for (const EurocCamera& camera : recording->cameras) {
+  for (const RecordedCamera& camera : (*recording)->cameras()) {
     ASSERT_TRUE(camera.calibration);
     theta.cameras.push_back(*camera.calibration);
   }
-  const std::vector<TrackPoint> points = TrackAll(*recording, theta);
+  const std::vector<TrackPoint> points = TrackAll(**recording, theta);
   std::set<std::pair<int, std::uint64_t>> tracks;
   std::set<std::pair<int, std::uint64_t>> left;
   std::size_t stereo = 0;
@@ -273,7 +323,7 @@ TEST(EurocImages, RealImagesAreTracked) {
     if (point.camera == 1)
       stereo += left.contains({point.image, point.landmark});
   }
-  const std::size_t images = recording->cameras[0].images.size();
+  const std::size_t images = (*recording)->cameras()[0].image_times_ns.size();
   const double per_image = static_cast<double>(points.size()) / (2 * images);
   const double length = static_cast<double>(points.size()) / tracks.size();
   RecordProperty("points_per_image", std::to_string(per_image));

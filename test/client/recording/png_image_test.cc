@@ -24,7 +24,7 @@ class PngImage : public testing::Test {
  protected:
   absl::StatusOr<GreyPixels> WrittenAndRead(const cv::Mat& image) {
     EXPECT_TRUE(cv::imwrite(path_, image));
-    return ReadPng(path_);
+    return DecodePng(ReadBytes(path_));
   }
 
   TempFolder folder_{FolderInMemory()};
@@ -67,11 +67,10 @@ TEST_F(PngImage, FileThatIsCutOffAnywhereIsReported) {
   ASSERT_TRUE(cv::imwrite(path_, Pattern(CV_8UC1)));
   const std::string whole = ReadBytes(path_);
   for (std::size_t size = 0; size < whole.size(); size += 23) {
-    WriteBytes(path_, whole.substr(0, size));
-    const auto pixels = ReadPng(path_);
+    const auto pixels = DecodePng(whole.substr(0, size));
     ASSERT_EQ(pixels.status().code(), absl::StatusCode::kDataLoss) << size;
-    EXPECT_NE(pixels.status().message().find("image.png: not a whole PNG: "),
-              std::string::npos);
+    EXPECT_TRUE(std::string(pixels.status().message())
+                    .starts_with("not a whole PNG: "));
   }
 }
 
@@ -81,19 +80,12 @@ TEST_F(PngImage, DamageIsReportedAndDoesNotAbort) {
   for (std::size_t i = 0; i < whole.size(); ++i) {
     std::string damaged = whole;
     damaged[i] = static_cast<char>(damaged[i] ^ 0x55);
-    WriteBytes(path_, damaged);
-    const auto pixels = ReadPng(path_);
+    const auto pixels = DecodePng(damaged);
     // Each chunk has a checksum; that of the last one is not of pixels.
     if (i < whole.size() - 12) {
       EXPECT_FALSE(pixels.ok()) << i;
     }
   }
-}
-
-TEST_F(PngImage, MissingFileIsNotFound) {
-  const auto pixels = ReadPng(path_);
-  EXPECT_EQ(pixels.status().code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(pixels.status().message(), path_ + ": cannot be opened");
 }
 
 }  // namespace

@@ -1,0 +1,98 @@
+// A recording of cameras and an IMU, in any container:
+//
+//   folder of EuRoC's format (Burri et al. 2016), TUM-VI's included
+//   folder of images with cam0.csv, cam1.csv, ... and imu.csv
+//   bag of ROS 1
+//   bag of ROS 2, in MCAP or SQLite: a file, or the folder with metadata.yaml
+//
+// Lists of times and readings are read at once, images when they are asked for,
+// so that a recording of any length needs little memory. docs/recordings.md
+// describes the containers.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/recording/grey_pixels.h"
+#include "core/model/camera.h"
+#include "core/model/segment.h"
+
+namespace selfcal::client {
+
+struct RecordedCamera {
+  std::string name;  // "cam0"
+  // Stamps of the images, each later than the one before.
+  std::vector<std::int64_t> image_times_ns;
+  // What the recording states about the camera, if it does.
+  std::optional<CameraCalibration> calibration;
+  // False if the recording states no pose: that of `calibration` is the
+  // identity.
+  bool has_pose = false;
+};
+
+struct RecordedData {
+  std::vector<RecordedCamera> cameras;  // at least one, each with an image
+  std::vector<ImuSample> imu;  // each later than the one before; at least one
+  std::vector<std::string> problems;
+};
+
+// An open recording. Not thread-safe: one call at a time.
+class Recording {
+ public:
+  virtual ~Recording() = default;
+  Recording(const Recording&) = delete;
+  Recording& operator=(const Recording&) = delete;
+
+  const std::vector<RecordedCamera>& cameras() const { return data_.cameras; }
+  const std::vector<ImuSample>& imu() const { return data_.imu; }
+  // What was left out or repaired: a sentence each.
+  const std::vector<std::string>& problems() const { return data_.problems; }
+
+  // Reads an image by its index in image_times_ns of a camera. DATA_LOSS with
+  // the file for one that is damaged or, if the camera has a calibration, of
+  // another size; NOT_FOUND for a file that is gone.
+  virtual absl::StatusOr<GreyPixels> ReadImage(int camera, int image) = 0;
+
+ protected:
+  explicit Recording(RecordedData data) : data_(std::move(data)) {}
+
+  // What ReadImage returns of pixels that were read from `where`: an error with
+  // that name, also if camera j has a calibration for another size.
+  absl::StatusOr<GreyPixels> Checked(absl::StatusOr<GreyPixels> pixels,
+                                     const std::string& where,
+                                     int j) const;
+
+ private:
+  const RecordedData data_;
+};
+
+// Images with the same timestamp: for each camera the index of its image, or
+// -1.
+struct ImageSet {
+  std::int64_t t_ns = 0;
+  std::vector<int> images;
+};
+// All images, in order of time.
+std::vector<ImageSet> ImageSets(const Recording& recording);
+
+// Topics of a bag. Those that are not stated are found by their types: each
+// topic of images is a camera, in the order of their names.
+struct RecordingOptions {
+  std::vector<std::string> camera_topics;  // in the order of the cameras
+  std::string imu_topic;
+};
+
+// Opens a recording, whose container is recognised by its content. NOT_FOUND if
+// there is none, or no images or readings in it, INVALID_ARGUMENT for one that
+// is not as its format demands; one sentence with the file, and for a list with
+// the line.
+absl::StatusOr<std::unique_ptr<Recording>> OpenRecording(
+    const std::string& path, const RecordingOptions& options);
+
+}  // namespace selfcal::client
