@@ -1,0 +1,314 @@
+#include "client/odometry/odometry.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "client/tracking/feature_tracker.h"
+#include "core/motion/estimate_motion.h"
+
+namespace selfcal::client {
+namespace {
+
+// Readings that the tracker needs about the last exposure of an image.
+constexpr std::int64_t kTrackerLead_ns = 300'000'000;
+constexpr std::size_t kMinUnreadable = 10;
+
+// Every n-th stamp is a keyframe.
+int KeyframeStep(const std::vector<ImageSet>& sets, double rate_hz) {
+  if (sets.size() < 2) return 1;
+  std::vector<std::int64_t> steps_ns;
+  for (std::size_t i = 1; i < sets.size(); ++i) {
+    steps_ns.push_back(sets[i].t_ns - sets[i - 1].t_ns);
+  }
+  const auto middle =
+      steps_ns.begin() + static_cast<std::ptrdiff_t>(steps_ns.size() / 2);
+  std::nth_element(steps_ns.begin(), middle, steps_ns.end());
+  const double step_s = 1e-9 * static_cast<double>(*middle);
+  // A tenth of a step less: stamps jitter.
+  return std::max(1, static_cast<int>(std::ceil(1 / (rate_hz * step_s) - 0.1)));
+}
+
+struct Keyframe {
+  std::int64_t t_ns = 0;
+  std::vector<TrackPoint> points;
+};
+
+}  // namespace
+
+class Odometry::Impl {
+ public:
+  Impl(Recording* recording,
+       const Rig& rig,
+       const Calibration& theta,
+       const OdometryOptions& options)
+      : recording_(recording),
+        rig_(rig),
+        options_(options),
+        sets_(ImageSets(*recording)),
+        step_(KeyframeStep(sets_, options.keyframe_rate_hz)),
+        tracker_(theta, {}),
+        index_(options.first_index) {
+    if (options.after_ns) {
+      next_set_ = static_cast<std::size_t>(
+          std::upper_bound(sets_.begin(),
+                           sets_.end(),
+                           *options.after_ns,
+                           [](std::int64_t t_ns, const ImageSet& set) {
+                             return t_ns < set.t_ns;
+                           }) -
+          sets_.begin());
+    }
+    progress_.of = sets_.size();
+    progress_.images = next_set_;
+  }
+
+  absl::StatusOr<std::optional<OdometrySegment>> Next(const Calibration& theta,
+                                                      std::int64_t version) {
+    for (;;) {
+      const bool more = next_set_ < sets_.size();
+      if (more) {
+        const absl::Status read = ReadSet();
+        if (!read.ok()) return read;
+      }
+      // A segment ends with the keyframe after it, at a gap, or at the end.
+      const bool gap = keyframes_.size() > 1 && GapBeforeLast();
+      const bool full =
+          static_cast<int>(keyframes_.size()) > options_.keyframes;
+      if (!gap && !full && more) continue;
+      const bool followed = gap || full;
+      std::optional<OdometrySegment> segment = Close(followed, theta, version);
+      if (gap) before_.reset();
+      if (segment) return segment;
+      if (!more) return std::optional<OdometrySegment>();
+    }
+  }
+
+  const OdometryProgress& progress() const { return progress_; }
+
+ private:
+  bool GapBeforeLast() const {
+    const std::int64_t gap_ns =
+        keyframes_.back().t_ns - keyframes_[keyframes_.size() - 2].t_ns;
+    return 1e-9 * static_cast<double>(gap_ns) > options_.max_gap_s;
+  }
+
+  absl::Status ReadSet() {
+    const ImageSet& set = sets_[next_set_];
+    std::vector<GreyPixels> pixels(set.images.size());
+    std::vector<cv::Mat> images(set.images.size());
+    for (std::size_t j = 0; j < set.images.size(); ++j) {
+      if (set.images[j] < 0) continue;
+      auto read = recording_->ReadImage(static_cast<int>(j), set.images[j]);
+      if (!read.ok()) {
+        ++progress_.unreadable;
+        progress_.last_error = std::string(read.status().message());
+        continue;
+      }
+      pixels[j] = *std::move(read);
+      const CameraCalibration& camera = rig_.factory.cameras[j];
+      if (pixels[j].width_px != camera.width_px ||
+          pixels[j].height_px != camera.height_px) {
+        return absl::InvalidArgumentError(
+            fmt::format("the images of {} have {} x {} px, while the "
+                        "calibration is for {} x {} px",
+                        recording_->cameras()[j].name,
+                        pixels[j].width_px,
+                        pixels[j].height_px,
+                        camera.width_px,
+                        camera.height_px));
+      }
+      images[j] = cv::Mat(pixels[j].height_px,
+                          pixels[j].width_px,
+                          CV_8UC1,
+                          pixels[j].pixels.data());
+    }
+    progress_.images = next_set_ + 1;
+    if (progress_.unreadable >= kMinUnreadable &&
+        2 * progress_.unreadable >
+            progress_.images * recording_->cameras().size()) {
+      return absl::DataLossError(
+          fmt::format("most images cannot be read, the last one because: {}",
+                      progress_.last_error));
+    }
+    const std::span<const ImuSample> imu = recording_->imu();
+    for (; next_sample_ < imu.size() &&
+           imu[next_sample_].t_ns <= set.t_ns + kTrackerLead_ns;
+         ++next_sample_) {
+      tracker_.AddImu(imu[next_sample_]);
+    }
+    std::vector<TrackPoint> points = tracker_.Track(set.t_ns, images);
+    if (next_set_ % static_cast<std::size_t>(step_) == 0 && Covered(set.t_ns)) {
+      keyframes_.push_back({set.t_ns, std::move(points)});
+    }
+    ++next_set_;
+    return absl::OkStatus();
+  }
+
+  bool Covered(std::int64_t t_ns) const {
+    const std::vector<ImuSample>& imu = recording_->imu();
+    return imu.front().t_ns <= t_ns && t_ns <= imu.back().t_ns;
+  }
+
+  // Readings from kImuPadding_s before the first keyframe to as long after the
+  // last one, or to the first keyframe of the next segment.
+  std::vector<ImuSample> Readings(std::int64_t from_ns,
+                                  std::int64_t to_ns) const {
+    const std::vector<ImuSample>& imu = recording_->imu();
+    const auto padding_ns = static_cast<std::int64_t>(1e9 * kImuPadding_s);
+    const auto earlier = [](const ImuSample& sample, std::int64_t t_ns) {
+      return sample.t_ns < t_ns;
+    };
+    auto first =
+        std::lower_bound(imu.begin(), imu.end(), from_ns - padding_ns, earlier);
+    auto last =
+        std::lower_bound(imu.begin(), imu.end(), to_ns + padding_ns, earlier);
+    if (last != imu.end()) ++last;
+    return {first, last};
+  }
+
+  // Takes the keyframes of the segment; `followed` if the last keyframe belongs
+  // to the next one. nullopt if there are too few.
+  std::optional<OdometrySegment> Close(bool followed,
+                                       const Calibration& theta,
+                                       std::int64_t version) {
+    std::vector<Keyframe> rest;
+    if (followed) {
+      rest.push_back(std::move(keyframes_.back()));
+      keyframes_.pop_back();
+    }
+    std::vector<Keyframe> taken = std::exchange(keyframes_, std::move(rest));
+    if (static_cast<int>(taken.size()) < options_.min_keyframes) {
+      before_.reset();
+      // Neighbours in index are joined only if they are so in time.
+      if (!taken.empty()) ++index_;
+      return std::nullopt;
+    }
+    const std::int64_t next_ns =
+        followed && 1e-9 * static_cast<double>(keyframes_.front().t_ns -
+                                               taken.back().t_ns) <=
+                        options_.max_gap_s
+            ? keyframes_.front().t_ns
+            : taken.back().t_ns;
+    OdometrySegment result;
+    const MotionSegment tracks = Assemble(taken, next_ns);
+    if (!before_ || !Continue(theta, tracks, &result)) {
+      Begin(theta, tracks, &result);
+    }
+    result.segment.calibration_version = version;
+    ++index_;
+    if (next_ns == taken.back().t_ns) ++index_;
+    return result;
+  }
+
+  MotionSegment Assemble(const std::vector<Keyframe>& keyframes,
+                         std::int64_t next_ns) const {
+    MotionSegment segment;
+    segment.key = {options_.session, index_};
+    segment.imu = Readings(keyframes.front().t_ns, next_ns);
+    std::map<std::uint64_t, int> seen;
+    for (const Keyframe& keyframe : keyframes) {
+      segment.keyframes.push_back({.t_ns = keyframe.t_ns});
+      for (const TrackPoint& point : keyframe.points) ++seen[point.landmark];
+    }
+    std::map<std::uint64_t, int> index_of;
+    for (const auto& [landmark, observations] : seen) {
+      if (observations < options_.min_observations) continue;
+      index_of[landmark] = static_cast<int>(segment.landmarks.size());
+      segment.landmarks.push_back({.id = IdIn(frame_, landmark)});
+    }
+    for (std::size_t k = 0; k < keyframes.size(); ++k) {
+      for (const TrackPoint& point : keyframes[k].points) {
+        const auto found = index_of.find(point.landmark);
+        if (found == index_of.end()) continue;
+        segment.observations.push_back({.keyframe = static_cast<int>(k),
+                                        .camera = point.camera,
+                                        .landmark = found->second,
+                                        .z_px = point.z_px});
+      }
+    }
+    return segment;
+  }
+
+  // The motion of a segment that follows another. False if none is found from
+  // where that ended, which may be wrong.
+  bool Continue(const Calibration& theta,
+                const MotionSegment& tracks,
+                OdometrySegment* result) {
+    const KeyframeState first = CarryOn(rig_,
+                                        theta,
+                                        before_->keyframes.back(),
+                                        before_->imu,
+                                        tracks.keyframes.front().t_ns);
+    return Find(theta, {first.b_a, first.b_g, first}, tracks, result);
+  }
+
+  // The motion of a segment in a frame of its own. Its index and the ids of its
+  // landmarks keep it apart from those before it.
+  void Begin(const Calibration& theta,
+             MotionSegment tracks,
+             OdometrySegment* result) {
+    if (index_ > options_.first_index) tracks.key.index = ++index_;
+    for (Landmark& landmark : tracks.landmarks) {
+      landmark.id = IdIn(index_, landmark.id);
+    }
+    frame_ = index_;
+    Find(theta, {}, tracks, result);
+  }
+
+  bool Find(const Calibration& theta,
+            const MotionStart& start,
+            const MotionSegment& tracks,
+            OdometrySegment* result) {
+    result->segment = tracks;
+    const MotionEstimate estimate =
+        EstimateMotion(rig_, theta, start, &result->segment);
+    result->failure = estimate.failure;
+    result->reprojection_rms_px = estimate.reprojection_rms_px;
+    before_.reset();
+    if (estimate.failure.empty()) before_ = result->segment;
+    return before_.has_value();
+  }
+
+  // The id of a track in the frame that begins with a segment.
+  static std::uint64_t IdIn(std::int64_t frame, std::uint64_t id) {
+    return (static_cast<std::uint64_t>(frame) << 32) | (id & 0xffffffff);
+  }
+
+  Recording* recording_;
+  const Rig rig_;
+  const OdometryOptions options_;
+  const std::vector<ImageSet> sets_;
+  const int step_;
+  FeatureTracker tracker_;
+  OdometryProgress progress_;
+  std::size_t next_set_ = 0;
+  std::size_t next_sample_ = 0;
+  std::vector<Keyframe> keyframes_;
+  std::int64_t index_;
+  std::int64_t frame_ = 0;  // index of the segment with which G began
+  std::optional<MotionSegment> before_;  // with its motion
+};
+
+Odometry::Odometry(Recording* recording,
+                   const Rig& rig,
+                   const Calibration& theta,
+                   const OdometryOptions& options)
+    : impl_(std::make_unique<Impl>(recording, rig, theta, options)) {}
+
+Odometry::~Odometry() = default;
+
+absl::StatusOr<std::optional<OdometrySegment>> Odometry::Next(
+    const Calibration& theta, std::int64_t version) {
+  return impl_->Next(theta, version);
+}
+
+const OdometryProgress& Odometry::progress() const { return impl_->progress(); }
+
+}  // namespace selfcal::client
