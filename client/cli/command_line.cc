@@ -26,7 +26,7 @@ constexpr char kFooter[] =
     "segment\npreflight or rig verify found something; 2 wrong usage, unusable "
     "input, or a file\nthat exists or cannot be written; 3 the daemon cannot "
     "be "
-    "reached; 4 daemon doctor\nfound damage.";
+    "reached; 4 daemon doctor\nfound damage; 5 calibrate has a weak result.";
 
 // Help shows a command under its name alone.
 class Formatter final : public CLI::Formatter {
@@ -117,6 +117,8 @@ int RunCommandLine(int argc, const char* const* argv) {
     CLI::App app("selfcal feeds and inspects selfcald.", "selfcal");
     app.formatter(std::make_shared<Formatter>());
     AddGlobalOptions(&app, &context);
+    AddCalibrate(&app, &context);
+    AddTrack(&app, &context);
     AddRigCommands(&app, &context);
     AddSegmentCommands(&app, &context);
     AddSessionCommands(&app, &context);

@@ -10,6 +10,9 @@
 
 namespace selfcal::client {
 
+// Of recordings; without OpenCV these commands say that they are missing.
+void AddCalibrate(CLI::App* app, Context* context);
+void AddTrack(CLI::App* app, Context* context);
 void AddRigCommands(CLI::App* app, Context* context);
 void AddSegmentCommands(CLI::App* app, Context* context);
 void AddSessionCommands(CLI::App* app, Context* context);

@@ -3,7 +3,8 @@
 //
 // Exit codes: 0 success; 1 the daemon refused the request, or the operation
 // failed; 2 wrong usage, unusable input, or an output file that exists or
-// cannot be written; 3 the daemon cannot be reached; 4 its database is damaged.
+// cannot be written; 3 the daemon cannot be reached; 4 its database is damaged;
+// 5 the calibration is weak.
 #pragma once
 
 #include <absl/status/status.h>
@@ -29,6 +30,7 @@ inline constexpr int kFailed = 1;
 inline constexpr int kUsage = 2;
 inline constexpr int kUnreachable = 3;
 inline constexpr int kDamaged = 4;
+inline constexpr int kWeak = 5;
 
 struct Context {
   Target target;

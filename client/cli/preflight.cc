@@ -12,6 +12,7 @@
 #include "client/cli/device_data.h"
 #include "client/cli/diagnosis_text.h"
 #include "client/cli/error_lines.h"
+#include "client/cli/preflight_subject.h"
 #include "client/cli/recording_input.h"
 #include "client/cli/rig_input.h"
 #include "core/preflight/diagnose.h"
@@ -28,12 +29,6 @@ struct PreflightOptions {
 };
 
 // The rig and the segments that are checked.
-struct Subject {
-  Rig rig;
-  Calibration theta;
-  std::vector<MotionSegment> segments;
-};
-
 absl::Status Invalid(const std::string& source,
                      const std::vector<Violation>& violations) {
   return absl::InvalidArgumentError(source +
@@ -53,7 +48,8 @@ absl::StatusOr<Rig> ReadRigFile(const std::string& file) {
   return rig;
 }
 
-absl::Status FromRecording(const PreflightOptions& options, Subject* subject) {
+absl::Status FromRecording(const PreflightOptions& options,
+                           PreflightSubject* subject) {
   auto recording = ReadRecording(options.recording);
   if (!recording.ok()) return recording.status();
   subject->rig = recording->rig;
@@ -70,44 +66,14 @@ absl::Status FromRecording(const PreflightOptions& options, Subject* subject) {
   return absl::OkStatus();
 }
 
-grpc::Status FromDevice(Context* context,
-                        const PreflightOptions& options,
-                        Subject* subject) {
-  v1::Rig message;
-  grpc::Status status = ReadDevice(context, options.device, &message);
-  if (!status.ok()) return status;
-  if (const auto violations = FromProto(message, "", &subject->rig);
-      !violations.empty()) {
-    return {grpc::StatusCode::DATA_LOSS,
-            "the daemon's rig is not valid: " + violations[0].message};
-  }
-  status = ReadNewestSegments(
-      context, options.device, options.newest, &subject->segments);
-  if (!status.ok()) return status;
-  if (subject->segments.empty()) {
-    return {grpc::StatusCode::FAILED_PRECONDITION,
-            "the daemon has no segment data of " + options.device +
-                ": send segments from the device, then try again"};
-  }
-  const std::int64_t version = subject->segments[0].calibration_version;
-  const auto theta = ReadVersion(context, subject->rig, version);
-  if (!theta) {
-    return {grpc::StatusCode::NOT_FOUND,
-            fmt::format("version {}, with which the segments were recorded, "
-                        "cannot be read",
-                        version)};
-  }
-  subject->theta = *theta;
-  return status;
-}
-
 int Preflight(Context* context, const PreflightOptions& options) {
-  Subject subject;
+  PreflightSubject subject;
   if (options.device.empty()) {
     const absl::Status read = FromRecording(options, &subject);
     if (!read.ok()) return FailInput(read);
   } else {
-    const grpc::Status read = FromDevice(context, options, &subject);
+    const grpc::Status read =
+        ReadPreflightSubject(context, options.device, options.newest, &subject);
     if (!read.ok()) return Fail(*context, read);
   }
   const Diagnosis diagnosis =

@@ -6,6 +6,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/new_file.h"
+#include "client/cli/report_file.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 #include "selfcal/v1/rig.grpc.pb.h"
@@ -13,13 +14,6 @@
 
 namespace selfcal::client {
 namespace {
-
-struct ReportOptions {
-  std::string rig;
-  std::string version = "active";
-  std::string output;
-  bool force = false;
-};
 
 grpc::Status GatherCalibrations(Context* context,
                                 const ReportOptions& options,
@@ -63,6 +57,8 @@ grpc::Status GatherSegments(Context* context,
   return status;
 }
 
+}  // namespace
+
 int WriteReportFile(Context* context, const ReportOptions& options) {
   using Service = v1::RigService::StubInterface;
   NewFile file;
@@ -81,8 +77,6 @@ int WriteReportFile(Context* context, const ReportOptions& options) {
   if (written.ok()) written = file.Commit();
   return written.ok() ? kDone : FailInput(written);
 }
-
-}  // namespace
 
 CLI::App* AddCalibrationReport(CLI::App* parent,
                                const std::string& name,

@@ -33,6 +33,12 @@ absl::StatusOr<std::string> ReadInput(const std::string& name) {
   return std::string(std::istreambuf_iterator<char>(std::cin), {});
 }
 
+// A rig that is not selfcal's own has no groups: the daemon sets the default.
+v1::Rig WithoutGroups(v1::Rig rig) {
+  rig.clear_groups();
+  return rig;
+}
+
 absl::StatusOr<v1::Rig> ReadForeign(const RigInput& input,
                                     std::vector<Loss>* losses) {
   const auto files = ReadTextFiles(input.files);
@@ -53,13 +59,12 @@ absl::StatusOr<v1::Rig> ReadForeign(const RigInput& input,
     return absl::InvalidArgumentError(
         "no rig was created: --strict is set, and the conversion has losses");
   }
-  v1::Rig rig = ToProto(imported->rig);
-  rig.clear_groups();  // files have no groups: the daemon sets the default
-  return rig;
+  return WithoutGroups(ToProto(imported->rig));
 }
 
 absl::StatusOr<v1::Rig> ReadBase(const RigInput& input,
                                  std::vector<Loss>* losses) {
+  if (input.base) return WithoutGroups(ToProto(*input.base));
   if (!input.from.empty()) return ReadForeign(input, losses);
   if (!input.vi_map.empty()) {
     absl::StatusOr<ViMapRecording> recording = ReadViMap(input.vi_map, {});
@@ -69,9 +74,7 @@ absl::StatusOr<v1::Rig> ReadBase(const RigInput& input,
           KeepCameras(input.cameras, &recording->rig, losses);
       if (!kept.ok()) return kept;
     }
-    v1::Rig rig = ToProto(recording->rig);
-    rig.clear_groups();  // a VI-map has no groups: the daemon sets the default
-    return rig;
+    return WithoutGroups(ToProto(recording->rig));
   }
   if (!input.cameras.empty()) {
     return absl::InvalidArgumentError(

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/formats/format.h"
+#include "core/model/rig.h"
 #include "selfcal/v1/rig.pb.h"
 
 namespace selfcal::client {
@@ -19,6 +20,7 @@ struct RigInput {
   std::vector<std::string> files;
   std::string from;    // a format of client/formats
   std::string vi_map;  // folder of a VI-map, instead of files
+  std::optional<Rig> base;  // instead of files: what a recording says
   std::optional<double> imu_rate_hz;
   bool strict = false;  // fail if reading `from` has losses
   // The cameras to take from `from` or `vi_map`: cam0, ...; empty: all.

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "client/demo/daemon_process.h"
+#include "client/process/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "client/demo/stream_segments.h"
 #include "client/text/text.h"

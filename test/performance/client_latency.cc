@@ -18,7 +18,7 @@
 #include <thread>
 #include <vector>
 
-#include "client/demo/daemon_process.h"
+#include "client/process/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "client/selfcal/client.h"
 #include "client/selfcal/segment_builder.h"

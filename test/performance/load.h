@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "client/demo/daemon_process.h"
+#include "client/process/daemon_process.h"
 
 namespace selfcal::client {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "client/demo/daemon_process.h"
+#include "client/process/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "test/support/temp_folder.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <string>
 
-#include "client/demo/daemon_process.h"
+#include "client/process/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "proto/convert.h"
 #include "test/support/temp_folder.h"

@@ -1,4 +1,6 @@
-// selfcald as a child process that the demo may kill.
+// selfcald as a child process, for programs that need a daemon of their own. It
+// ends with the program: also when that is killed, and not by a signal from the
+// terminal, which only the program gets.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -11,8 +13,9 @@ namespace selfcal::client {
 
 class DaemonProcess {
  public:
-  // Starts `binary` on `state_dir` (its output goes to `state_dir`/log) and
-  // waits until it serves. UNAVAILABLE with the end of the log if it does not.
+  // Starts `binary` on `state_dir` (its output is appended to `state_dir`.log)
+  // and waits until it serves. NOT_FOUND without the binary, UNAVAILABLE with
+  // the end of the log if it does not serve.
   static absl::StatusOr<std::unique_ptr<DaemonProcess>> Start(
       const std::string& binary, const std::string& state_dir);
   ~DaemonProcess();  // sends SIGTERM and waits for the end

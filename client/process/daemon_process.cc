@@ -1,10 +1,11 @@
-#include "client/demo/daemon_process.h"
+#include "client/process/daemon_process.h"
 
 #include <absl/status/status.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <grpcpp/create_channel.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -40,8 +41,12 @@ std::string EndOfLog(const std::string& path) {
 pid_t Spawn(const std::string& binary,
             const std::string& state_dir,
             const std::string& log) {
+  const pid_t parent = getpid();
   const pid_t pid = fork();
   if (pid != 0) return pid;
+  setpgid(0, 0);
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (getppid() != parent) _exit(127);
   const int fd = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
   dup2(fd, STDOUT_FILENO);
   dup2(fd, STDERR_FILENO);
@@ -58,8 +63,9 @@ pid_t Spawn(const std::string& binary,
 absl::StatusOr<std::unique_ptr<DaemonProcess>> DaemonProcess::Start(
     const std::string& binary, const std::string& state_dir) {
   if (!std::filesystem::exists(binary)) {
-    return absl::NotFoundError(
-        fmt::format("{} does not exist; build the target selfcald", binary));
+    return absl::NotFoundError(fmt::format(
+        "{} does not exist; it is the program of the package selfcald",
+        binary));
   }
   const std::string log = state_dir + ".log";
   const pid_t pid = Spawn(binary, state_dir, log);

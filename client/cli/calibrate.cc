@@ -1,0 +1,248 @@
+// calibrate: from recordings to a calibration, with a daemon of its own.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "client/cli/calibration_results.h"
+#include "client/cli/commands.h"
+#include "client/cli/device_data.h"
+#include "client/cli/diagnosis_text.h"
+#include "client/cli/foreign_files.h"
+#include "client/cli/positive_number.h"
+#include "client/cli/preflight_subject.h"
+#include "client/cli/recorded_rig.h"
+#include "client/cli/recorded_sessions.h"
+#include "client/cli/recording_feed.h"
+#include "client/cli/rig_input.h"
+#include "client/cli/rig_options.h"
+#include "client/cli/run_following.h"
+#include "client/process/daemon_process.h"
+#include "client/text/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/recalibration.grpc.pb.h"
+#include "selfcal/v1/rig.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Segments that the pre-flight check looks at.
+constexpr int kPreflightSegments = 15;
+
+struct CalibrateInput {
+  RecordingsInput recordings;
+  RigInput rig;
+  std::vector<std::string> from;  // the tool, and its files
+  std::string output;
+  std::string daemon;  // path of selfcald; empty: found
+};
+
+// The daemon beside this program, as both are installed, or in the build tree,
+// or on the path.
+std::string FindDaemon() {
+  std::error_code error;
+  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+  std::vector<fs::path> places = {
+      self.parent_path() / "selfcald",
+      self.parent_path() / "../../server/daemon/selfcald"};
+  const char* const path = std::getenv("PATH");
+  std::string rest = path == nullptr ? "" : path;
+  while (!rest.empty()) {
+    const std::size_t colon = std::min(rest.find(':'), rest.size());
+    if (colon > 0)
+      places.push_back(fs::path(rest.substr(0, colon)) / "selfcald");
+    rest.erase(0, colon + 1);
+  }
+  for (const fs::path& place : places) {
+    if (access(place.c_str(), X_OK) == 0) return place.lexically_normal();
+  }
+  return "selfcald";
+}
+
+// Creates the rig from what the command line and the recordings say, unless the
+// state has it already.
+int EnsureRig(Context* context,
+              const CalibrateInput& input,
+              const std::vector<RecordedSession>& sessions) {
+  v1::Rig existing;
+  grpc::Status status = ReadDevice(context, *input.rig.id, &existing);
+  if (status.ok()) return kDone;
+  if (status.error_code() != grpc::StatusCode::NOT_FOUND) {
+    return Fail(*context, status);
+  }
+  std::vector<Loss> losses;
+  const auto rig = ReadRecordedRig(
+      input.rig, input.from, *sessions.front().recording, &losses);
+  PrintLosses(losses);
+  if (!rig.ok()) return FailInput(rig.status());
+  using RigService = v1::RigService::StubInterface;
+  const auto stub = v1::RigService::NewStub(context->Channel());
+  v1::CreateRigRequest request;
+  *request.mutable_rig() = *rig;
+  v1::Rig created;
+  status =
+      Call<RigService>(stub.get(), &RigService::CreateRig, request, &created);
+  return status.ok() ? kDone : Fail(*context, status);
+}
+
+// Calibrates on all segments. Without a change since the last run, that has the
+// result.
+int Recalibrate(Context* context, const std::string& rig) {
+  using Service = v1::RecalibrationService::StubInterface;
+  const auto stub = v1::RecalibrationService::NewStub(context->Channel());
+  v1::StartRecalibrationRequest request;
+  request.set_parent(RigName(rig));
+  v1::Recalibration run;
+  const grpc::Status status =
+      Call<Service>(stub.get(), &Service::StartRecalibration, request, &run);
+  if (status.ok()) return FollowRun(context, stub.get(), std::move(run));
+  if (status.error_code() != grpc::StatusCode::FAILED_PRECONDITION) {
+    return Fail(*context, status);
+  }
+  v1::ListRecalibrationsRequest list;
+  list.set_parent(RigName(rig));
+  list.set_page_size(1);
+  v1::ListRecalibrationsResponse listed;
+  const grpc::Status found =
+      Call<Service>(stub.get(), &Service::ListRecalibrations, list, &listed);
+  if (!found.ok()) return Fail(*context, found);
+  if (listed.recalibrations().empty()) return Fail(*context, status);
+  return FollowRun(context, stub.get(), listed.recalibrations(0));
+}
+
+void WarnOfMistakes(Context* context, const std::string& rig) {
+  PreflightSubject subject;
+  const grpc::Status read =
+      ReadPreflightSubject(context, rig, kPreflightSegments, &subject);
+  if (read.ok()) {
+    WarnOf(Diagnose(subject.rig, subject.theta, subject.segments));
+  }
+}
+
+int FeedAndCalibrate(Context* context,
+                     const CalibrateInput& input,
+                     std::vector<RecordedSession>* sessions) {
+  if (const int code = EnsureRig(context, input, *sessions); code != kDone) {
+    return code;
+  }
+  FeedCounts counts;
+  for (RecordedSession& session : *sessions) {
+    const int code =
+        FeedRecording(context,
+                      {.rig = *input.rig.id,
+                       .session = session.name,
+                       .keyframes = input.recordings.keyframes,
+                       .keyframe_rate_hz = input.recordings.keyframe_rate_hz},
+                      session.recording.get(),
+                      &counts);
+    if (code != kDone) return code;
+  }
+  PrintError(fmt::format("{} stored, {} left out",
+                         CountText(counts.sent, "segment"),
+                         counts.failed));
+  if (counts.sent == 0 && !counts.continued) {
+    return FailInput(absl::InvalidArgumentError(
+        "no motion was found in the recordings: move the device about all "
+        "axes, in front of a textured scene, for at least 20 s"));
+  }
+  WarnOfMistakes(context, *input.rig.id);
+  const int code = Recalibrate(context, *input.rig.id);
+  const int written =
+      WriteResults(context, *input.rig.id, input.output, input.rig.imu_rate_hz);
+  return code != kDone ? code : written;
+}
+
+int Calibrate(Context* context, CalibrateInput input) {
+  auto sessions = OpenSessions(input.recordings);
+  if (!sessions.ok()) return FailInput(sessions.status());
+  std::error_code error;
+  const fs::path state = fs::path(input.output) / "state";
+  fs::create_directories(state, error);
+  if (error) {
+    return FailInput(absl::InvalidArgumentError(fmt::format(
+        "{}: cannot be created: {}", state.string(), error.message())));
+  }
+  if (!input.rig.imu_rate_hz) {
+    input.rig.imu_rate_hz = ImuRate(*sessions->front().recording);
+  }
+  const auto daemon =
+      DaemonProcess::Start(input.daemon.empty() ? FindDaemon() : input.daemon,
+                           fs::absolute(state).lexically_normal());
+  if (!daemon.ok()) {
+    PrintError(std::string(daemon.status().message()));
+    return kFailed;
+  }
+  context->target = {.address = (*daemon)->target()};
+  const absl::Status connected = context->Connect();
+  if (!connected.ok()) return FailInput(connected);
+  return FeedAndCalibrate(context, input, &*sessions);
+}
+
+}  // namespace
+
+void AddCalibrate(CLI::App* app, Context* context) {
+  CLI::App* command = app->add_subcommand(
+      "calibrate",
+      "Calibrate on recordings of images and readings: tracks features, "
+      "estimates the motion, keeps the most informative segments and "
+      "calibrates on them; needs no daemon. A further call with the same "
+      "--output continues. Exits with 0 if the result is good, with 5 if it is "
+      "weak, with 1 if it is not trustworthy");
+  const auto input = std::make_shared<CalibrateInput>();
+  input->rig.id = "device";
+  AddRecordingsOptions(command, &input->recordings);
+  command
+      ->add_option("--output",
+                   input->output,
+                   "Folder for the report, the calibration in the files of "
+                   "every tool that can express it, and the state, which "
+                   "`selfcald --state-dir` can go on with")
+      ->required();
+  command
+      ->add_option("--from",
+                   input->from,
+                   "TOOL FILE...: begin with the calibration in files of this "
+                   "tool, e.g. kalibr camchain-imucam.yaml imu.yaml [what the "
+                   "recording states]")
+      ->expected(2, 100);
+  command
+      ->add_option("--extrinsics",
+                   input->rig.extrinsics,
+                   "Pose of a camera, as cam0=PX,PY,PZ,QX,QY,QZ,QW: the "
+                   "transform that takes points from the IMU's frame to the "
+                   "camera's (z forward), as tf shows it; repeatable")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--cameras",
+                   input->rig.cameras,
+                   "With --from: only these cameras of the files, e.g. "
+                   "cam0,cam2 [all]")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  CLI::Option* const imu_rate =
+      command
+          ->add_option("--imu-rate",
+                       input->rig.imu_rate_hz,
+                       "Rate of the IMU, for noise that is stated per reading "
+                       "[that of the recording, Hz]")
+          ->check(AboveZero());
+  AddRigOverrides(command, imu_rate, &input->rig);
+  command->add_option(
+      "--selfcald",
+      input->daemon,
+      "The program selfcald [beside this program, or on the path]");
+  command->callback([context, input] {
+    context->command = [context, input] { return Calibrate(context, *input); };
+  });
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,97 @@
+#include "client/cli/calibration_results.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "client/cli/device_data.h"
+#include "client/cli/foreign_files.h"
+#include "client/cli/report_file.h"
+#include "client/formats/format.h"
+#include "proto/convert.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Files of the tools that can express the calibration. A tool that cannot is
+// named with its reason.
+absl::Status WriteForTools(const Rig& rig,
+                           const Calibration& theta,
+                           const fs::path& folder,
+                           std::optional<double> imu_rate_hz) {
+  for (const FormatInfo& format : Formats()) {
+    const auto exported =
+        ExportRig(format.name, rig, theta, {.imu_rate_hz = imu_rate_hz});
+    if (!exported.ok()) {
+      PrintError(fmt::format("no files for {}: {}",
+                             format.name,
+                             std::string(exported.status().message())));
+      continue;
+    }
+    if (ChangesPrediction(exported->losses)) {
+      PrintError(fmt::format("{} differs:", format.name));
+      PrintLosses(exported->losses);
+    }
+    const absl::Status written = WriteTextFiles(
+        exported->files,
+        OutputPaths(exported->files, (folder / format.name).string() + "/"),
+        true);
+    if (!written.ok()) return written;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+int WriteResults(Context* context,
+                 const std::string& rig_id,
+                 const std::string& folder,
+                 std::optional<double> imu_rate_hz) {
+  v1::Rig message;
+  grpc::Status status = ReadDevice(context, rig_id, &message);
+  if (!status.ok()) return Fail(*context, status);
+  using Service = v1::CalibrationService::StubInterface;
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  v1::GetCalibrationRequest request;
+  request.set_name(ChildName(rig_id, "calibrations", "active"));
+  v1::Calibration calibration;
+  status = Call<Service>(
+      stub.get(), &Service::GetCalibration, request, &calibration);
+  if (!status.ok()) return Fail(*context, status);
+  if (calibration.verdict().kind() == v1::Verdict::FACTORY) return kFailed;
+
+  Rig rig;
+  Calibration theta;
+  auto faults = FromProto(message, "rig", &rig);
+  if (faults.empty()) {
+    faults = FromProto(calibration.parameters(), "parameters", &theta);
+  }
+  if (!faults.empty()) {
+    PrintError(fmt::format("the daemon's answer cannot be read: {} {}",
+                           faults[0].field,
+                           faults[0].message));
+    return kFailed;
+  }
+  const fs::path to(folder);
+  absl::Status written = WriteForTools(rig, theta, to, imu_rate_hz);
+  if (written.ok()) {
+    written = WriteTextFiles({{"calibration.json", ToJson(calibration, false)}},
+                             {(to / "calibration.json").string()},
+                             true);
+  }
+  if (!written.ok()) return FailInput(written);
+  const int report = WriteReportFile(
+      context,
+      {.rig = rig_id, .output = (to / "report.html").string(), .force = true});
+  if (report != kDone) return report;
+  PrintError(fmt::format("report and files are in {}", folder));
+  return calibration.verdict().kind() == v1::Verdict::WEAK ? kWeak : kDone;
+}
+
+}  // namespace selfcal::client

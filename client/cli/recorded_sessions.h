@@ -1,0 +1,37 @@
+// The recordings on the command line.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/recording/recording.h"
+
+namespace selfcal::client {
+
+struct RecordingsInput {
+  std::vector<std::string> paths;
+  RecordingOptions topics;
+  int keyframes = 40;
+  double keyframe_rate_hz = 10;
+};
+
+struct RecordedSession {
+  std::string name;
+  std::unique_ptr<Recording> recording;
+};
+
+// Adds RECORDING..., --camera-topic, --imu-topic, --keyframes and
+// --keyframe-rate. `input` must outlive the command.
+void AddRecordingsOptions(CLI::App* command, RecordingsInput* input);
+
+// Opens all recordings, and prints what was left out of them. Sessions have the
+// names of their files, without folder and ending; the second of a name gets
+// "-2". INVALID_ARGUMENT for recordings with different numbers of cameras.
+absl::StatusOr<std::vector<RecordedSession>> OpenSessions(
+    const RecordingsInput& input);
+
+}  // namespace selfcal::client

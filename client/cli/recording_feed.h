@@ -1,0 +1,38 @@
+// Feeds a recording to the daemon: images and readings become segments, which
+// the daemon takes one after the other.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "client/cli/context.h"
+#include "client/recording/recording.h"
+
+namespace selfcal::client {
+
+struct FeedOptions {
+  std::string rig;
+  std::string session;
+  int keyframes = 40;            // of a segment
+  double keyframe_rate_hz = 10;  // at most
+};
+
+struct FeedCounts {
+  int sent = 0;    // stored by the daemon
+  int failed = 0;  // segments without a motion, or that the daemon rejected
+  bool continued = false;  // an earlier feed of this session had sent segments
+};
+
+// Sends the segments of a recording, from the end of what the daemon has of
+// this session. The motion of each is estimated with the calibration that is
+// active then: the next segment waits until the daemon has scored the one
+// before and ended the run that it started, so that the same recording leads to
+// the same calibration however fast the machine is. Shows progress, and prints
+// a line for each segment whose motion was not found. Returns the exit code,
+// after the error was printed.
+int FeedRecording(Context* context,
+                  const FeedOptions& options,
+                  Recording* recording,
+                  FeedCounts* counts);
+
+}  // namespace selfcal::client
