@@ -33,7 +33,7 @@ std::string Compressed(Compression compression, const std::string& content) {
   return bytes;
 }
 
-std::string Noise(std::size_t size) {
+std::string Content(std::size_t size) {
   std::mt19937 random(1);
   std::string content;
   for (std::size_t i = 0; i < size; ++i) {
@@ -46,7 +46,7 @@ class Decompression : public testing::TestWithParam<Compression> {};
 
 TEST_P(Decompression, GivesTheContentOfAnySize) {
   for (const std::size_t size : {0u, 1u, 1000u, 65536u, 65537u, 1000000u}) {
-    const std::string content = Noise(size);
+    const std::string content = Content(size);
     const auto back =
         Decompress(GetParam(), Compressed(GetParam(), content), size);
     ASSERT_TRUE(back.ok()) << back.status();
@@ -55,7 +55,7 @@ TEST_P(Decompression, GivesTheContentOfAnySize) {
 }
 
 TEST_P(Decompression, RefusesAnotherSizeThanIsStated) {
-  const std::string bytes = Compressed(GetParam(), Noise(1000));
+  const std::string bytes = Compressed(GetParam(), Content(1000));
   for (const std::size_t size : {0u, 999u, 1001u, 200'000'000u}) {
     EXPECT_EQ(Decompress(GetParam(), bytes, size).status().code(),
               absl::StatusCode::kDataLoss)
@@ -64,7 +64,7 @@ TEST_P(Decompression, RefusesAnotherSizeThanIsStated) {
 }
 
 TEST_P(Decompression, RefusesMoreThanTheLimit) {
-  const std::string bytes = Compressed(GetParam(), Noise(1000));
+  const std::string bytes = Compressed(GetParam(), Content(1000));
   const auto back = Decompress(GetParam(), bytes, kMaxChunkBytes + 1);
   EXPECT_EQ(back.status().message(),
             "a chunk of 268435457 bytes is larger than the 268435456 allowed");
@@ -80,14 +80,14 @@ TEST_P(Decompression, StopsBehindTheStatedSize) {
 }
 
 TEST_P(Decompression, RefusesWhatIsCutOff) {
-  const std::string bytes = Compressed(GetParam(), Noise(1000));
+  const std::string bytes = Compressed(GetParam(), Content(1000));
   for (std::size_t size = 0; size < bytes.size() / 2; size += 7) {
     EXPECT_FALSE(Decompress(GetParam(), bytes.substr(0, size), 1000).ok());
   }
 }
 
 TEST_P(Decompression, DamageDoesNotAbort) {
-  const std::string bytes = Compressed(GetParam(), Noise(3000));
+  const std::string bytes = Compressed(GetParam(), Content(3000));
   std::mt19937 random(1);
   int failed = 0;
   for (int i = 0; i < 3000; ++i) {
