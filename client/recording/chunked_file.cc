@@ -8,8 +8,6 @@
 namespace selfcal::client {
 namespace {
 
-// Chunks that are kept: at least one, others within this size.
-constexpr std::size_t kKeptBytes = std::size_t{64} << 20;
 constexpr std::uint64_t kWindowBytes = 16 << 10;
 
 absl::Status EndsEarly() {
@@ -18,8 +16,9 @@ absl::Status EndsEarly() {
 
 }  // namespace
 
-ChunkedFile::ChunkedFile(std::unique_ptr<InputFile> file)
-    : file_(std::move(file)) {}
+ChunkedFile::ChunkedFile(std::unique_ptr<InputFile> file,
+                         std::size_t kept_bytes)
+    : file_(std::move(file)), kept_bytes_(kept_bytes) {}
 
 absl::StatusOr<std::shared_ptr<const std::string>> ChunkedFile::AddChunk(
     const FileChunk& chunk, std::int32_t* number) {
@@ -89,7 +88,7 @@ void ChunkedFile::Keep(std::int32_t number,
   kept_.push_front({number, std::move(content)});
   for (auto it = std::next(kept_.begin()); it != kept_.end();) {
     bytes += it->content->size();
-    it = bytes > kKeptBytes ? kept_.erase(it) : std::next(it);
+    it = bytes > kept_bytes_ ? kept_.erase(it) : std::next(it);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <list>
 #include <memory>
@@ -32,7 +33,9 @@ struct FileChunk {
 // decompressed. Not thread-safe.
 class ChunkedFile {
  public:
-  explicit ChunkedFile(std::unique_ptr<InputFile> file);
+  // Of the chunks, the last one is kept, and others up to `kept_bytes` with it.
+  explicit ChunkedFile(std::unique_ptr<InputFile> file,
+                       std::size_t kept_bytes = std::size_t{16} << 20);
 
   const InputFile& file() const { return *file_; }
 
@@ -58,6 +61,7 @@ class ChunkedFile {
   void Keep(std::int32_t number, std::shared_ptr<const std::string> content);
 
   const std::unique_ptr<InputFile> file_;
+  const std::size_t kept_bytes_;
   std::vector<FileChunk> chunks_;
   std::list<Kept> kept_;  // the one that was used last comes first
   std::string buffer_;    // what Read returned from the file

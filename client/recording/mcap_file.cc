@@ -22,7 +22,13 @@ constexpr std::uint64_t kMessageHeaderBytes = 2 + 4 + 8 + 8;
 // Of a chunk before the name of its compression: two times, size, checksum.
 constexpr std::uint64_t kChunkHeaderBytes = 8 + 8 + 8 + 4;
 
+// Opcode and size of any record.
+constexpr std::uint64_t kRecordHeadBytes = 1 + 8;
+// The last record, before the magic bytes: two offsets, and a checksum.
+constexpr std::uint64_t kFooterBytes = kRecordHeadBytes + 8 + 8 + 4;
+
 enum Opcode : unsigned char {
+  kFooter = 2,
   kSchema = 3,
   kChannel = 4,
   kMessage = 5,
@@ -56,6 +62,7 @@ class McapFile : public MessageFile {
                     std::vector<std::string>* problems) override {
     Damage damage(file_.file().path());
     const std::uint64_t size = file_.file().size();
+    ReadSummary();
     Range file{RecordCursor(&file_.file(), begin_, size)};
     const absl::Status read = ReadRecords(&file, visit, &damage);
     if (!read.ok()) {
@@ -92,25 +99,62 @@ class McapFile : public MessageFile {
     return absl::OkStatus();
   }
 
+  // The summary repeats the definitions, of which the only ones elsewhere may
+  // be in a chunk that is damaged. It may be missing.
+  void ReadSummary() {
+    const std::uint64_t size = file_.file().size();
+    if (size < begin_ + kFooterBytes + begin_) return;
+    const std::uint64_t footer = size - begin_ - kFooterBytes;
+    RecordCursor end(&file_.file(), footer, size);
+    const auto record = end.Take(kRecordHeadBytes + 8);
+    if (!record.ok() || (*record)[0] != kFooter) return;
+    const auto begin =
+        LittleEndian<std::uint64_t>(record->substr(kRecordHeadBytes));
+    if (begin < begin_ || begin > footer) return;
+    RecordCursor cursor(&file_.file(), begin, footer);
+    while (cursor.left() > 0) {
+      const auto head = TakeHead(&cursor);
+      if (!head.ok()) return;
+      const absl::Status read =
+          head->opcode == kSchema || head->opcode == kChannel
+              ? ReadDefinition(*head, &cursor)
+              : cursor.Skip(head->size);
+      if (!read.ok()) return;
+    }
+  }
+
+  struct Head {
+    unsigned char opcode;
+    std::uint64_t size;
+  };
+  static absl::StatusOr<Head> TakeHead(RecordCursor* cursor) {
+    const auto bytes = cursor->Take(kRecordHeadBytes);
+    if (!bytes.ok()) return bytes.status();
+    return Head{static_cast<unsigned char>((*bytes)[0]),
+                LittleEndian<std::uint64_t>(bytes->substr(1))};
+  }
+
+  absl::Status ReadDefinition(const Head& head, RecordCursor* cursor) {
+    if (head.size > kMaxDefinitionBytes) {
+      return absl::DataLossError(
+          fmt::format("a definition of {} bytes", head.size));
+    }
+    const auto bytes = cursor->Take(head.size);
+    if (!bytes.ok()) return bytes.status();
+    return head.opcode == kSchema ? AddSchema(*bytes) : AddChannel(*bytes);
+  }
+
   absl::Status ReadRecord(Range* range, const Visitor& visit, Damage* damage) {
     RecordCursor& cursor = range->cursor;
-    const auto head = cursor.Take(1 + 8);
+    const auto head = TakeHead(&cursor);
     if (!head.ok()) return head.status();
-    const auto opcode = static_cast<unsigned char>((*head)[0]);
-    const auto size = LittleEndian<std::uint64_t>(head->substr(1));
-    switch (opcode) {
+    const std::uint64_t size = head->size;
+    switch (head->opcode) {
       case kMessage:
         return VisitMessage(range, size, visit);
       case kSchema:
-      case kChannel: {
-        if (size > kMaxDefinitionBytes) {
-          return absl::DataLossError(
-              fmt::format("a definition of {} bytes", size));
-        }
-        const auto bytes = cursor.Take(size);
-        if (!bytes.ok()) return bytes.status();
-        return opcode == kSchema ? AddSchema(*bytes) : AddChannel(*bytes);
-      }
+      case kChannel:
+        return ReadDefinition(*head, &cursor);
       case kChunk:
         if (range->is_chunk) {
           return absl::DataLossError("a chunk is in another one");

@@ -1,8 +1,8 @@
 // MCAP files (mcap.dev/spec) with messages of ROS 2 (encoding cdr) and ROS 1
-// (encoding ros1), in chunks that are uncompressed, lz4 or zstd, or in none.
-// The indexes and the summary are not used, so that files without them, or that
-// are cut off, are read as well. The checksum of a chunk is checked if it is
-// compressed.
+// (encoding ros1), in chunks that are uncompressed, lz4 or zstd, or in none. Of
+// the summary only the definitions of channels are used, and no index: files
+// without them, or that are cut off, are read as well. The checksum of a chunk
+// is checked if it is compressed.
 #pragma once
 
 #include <cstdint>

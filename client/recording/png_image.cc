@@ -26,6 +26,11 @@ void ReadBytes(png_structp png, png_bytep target, std::size_t size) {
   rest.remove_prefix(size);
 }
 
+// Chunks, each with its NUL, by which libpng would weight colours in linear
+// light instead: a recording has the same pixels in any container.
+constexpr png_byte kColourChunks[] = "gAMA\0sRGB\0cHRM\0iCCP";
+constexpr int kColourChunkCount = 4;
+
 class Decoder {
  public:
   explicit Decoder(std::string_view bytes) : rest_(bytes) {
@@ -34,6 +39,8 @@ class Decoder {
     if (png_ != nullptr) info_ = png_create_info_struct(png_);
     if (info_ == nullptr) throw std::runtime_error("no memory");
     png_set_user_limits(png_, kMaxImageSide_px, kMaxImageSide_px);
+    png_set_keep_unknown_chunks(
+        png_, PNG_HANDLE_CHUNK_NEVER, kColourChunks, kColourChunkCount);
     png_set_read_fn(png_, &rest_, ReadBytes);
   }
   ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }

@@ -1,6 +1,7 @@
 #include "client/recording/raw_image.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/escaping.h>
 #include <fmt/format.h>
 
 #include <cstdint>
@@ -152,10 +153,10 @@ absl::Status CheckSizes(const RosImage& image, const Encoding& encoding) {
 absl::StatusOr<GreyPixels> ConvertImage(const RosImage& image) {
   const Encoding* encoding = FindEncoding(image.encoding);
   if (encoding == nullptr) {
-    return absl::UnimplementedError(
-        fmt::format("the encoding '{}' is not one of {}",
-                    image.encoding.substr(0, 40),
-                    AllEncodings()));
+    return absl::UnimplementedError(fmt::format(
+        "the encoding '{}' is not one of {}",
+        absl::Utf8SafeCHexEscape(std::string(image.encoding.substr(0, 40))),
+        AllEncodings()));
   }
   const absl::Status sizes = CheckSizes(image, *encoding);
   if (!sizes.ok()) return sizes;
@@ -166,6 +167,12 @@ absl::StatusOr<GreyPixels> ConvertImage(const RosImage& image) {
   const Samples samples(image, *encoding);
   const bool deep = encoding->sample_bytes == 2;
   for (int v = 0; v < grey.height_px; ++v) {
+    if (encoding->layout == Layout::kGrey && !deep) {
+      const auto row = image.data.substr(
+          static_cast<std::size_t>(v) * image.step, image.width);
+      grey.pixels.insert(grey.pixels.end(), row.begin(), row.end());
+      continue;
+    }
     for (int u = 0; u < grey.width_px; ++u) {
       std::uint32_t value = 0;
       switch (encoding->layout) {

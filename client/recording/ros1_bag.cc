@@ -68,6 +68,7 @@ class Ros1Bag : public MessageFile {
                     std::vector<std::string>* problems) override {
     Damage damage(file_.file().path());
     const std::uint64_t size = file_.file().size();
+    ReadIndex();
     Range file{RecordCursor(&file_.file(), begin_, size)};
     const absl::Status read = ReadRecords(&file, visit, &damage);
     if (!read.ok()) damage.CutOff(file.cursor.at(), size, read);
@@ -96,31 +97,65 @@ class Ros1Bag : public MessageFile {
     return absl::OkStatus();
   }
 
-  absl::Status ReadRecord(Range* range, const Visitor& visit, Damage* damage) {
-    RecordCursor& cursor = range->cursor;
-    auto size = TakeSize(&cursor);
+  // The index repeats the connections, of which the only ones elsewhere may be
+  // in a chunk that is damaged. It is missing in a bag that was not closed.
+  void ReadIndex() {
+    const std::uint64_t size = file_.file().size();
+    RecordCursor first(&file_.file(), begin_, size);
+    const auto bag = TakeHead(&first);
+    if (!bag.ok()) return;
+    const auto begin = Number<std::uint64_t>(bag->fields, "index_pos");
+    if (!begin || *begin < begin_ || *begin > size) return;
+    RecordCursor cursor(&file_.file(), *begin, size);
+    while (cursor.left() > 0) {
+      const auto head = TakeHead(&cursor);
+      if (!head.ok()) return;
+      const absl::Status read =
+          head->op == kConnection
+              ? AddConnection(head->fields, &cursor, head->size)
+              : cursor.Skip(head->size);
+      if (!read.ok()) return;
+    }
+  }
+
+  // A record up to its data.
+  struct Head {
+    std::uint8_t op;
+    Fields fields;
+    std::uint32_t size;  // of the data
+  };
+  static absl::StatusOr<Head> TakeHead(RecordCursor* cursor) {
+    auto size = TakeSize(cursor);
     if (!size.ok()) return size.status();
     if (*size > kMaxHeaderBytes) {
       return absl::DataLossError(fmt::format("a header of {} bytes", *size));
     }
-    const auto header = cursor.Take(*size);
+    const auto header = cursor->Take(*size);
     if (!header.ok()) return header.status();
-    const auto fields = ParseFields(*header);
+    auto fields = ParseFields(*header);
     if (!fields.ok()) return fields.status();
-    size = TakeSize(&cursor);
+    size = TakeSize(cursor);
     if (!size.ok()) return size.status();
-    switch (Number<std::uint8_t>(*fields, "op").value_or(0)) {
+    const auto op = Number<std::uint8_t>(*fields, "op").value_or(0);
+    return Head{op, *std::move(fields), *size};
+  }
+
+  absl::Status ReadRecord(Range* range, const Visitor& visit, Damage* damage) {
+    RecordCursor& cursor = range->cursor;
+    const auto head = TakeHead(&cursor);
+    if (!head.ok()) return head.status();
+    switch (head->op) {
       case kMessage:
-        return VisitMessage(*fields, range, *size, visit);
+        return VisitMessage(head->fields, range, head->size, visit);
       case kConnection:
-        return AddConnection(*fields, &cursor, *size);
+        return AddConnection(head->fields, &cursor, head->size);
       case kChunk:
         if (range->is_chunk) {
           return absl::DataLossError("a chunk is in another one");
         }
-        return ReadChunk(*fields, &cursor, *size, visit, damage);
+        return ReadChunk(head->fields, &cursor, head->size, visit, damage);
       default:
-        return cursor.Skip(*size);
+        return cursor.Skip(head->size);
     }
   }
 
@@ -153,7 +188,7 @@ class Ros1Bag : public MessageFile {
     if (!bytes.ok()) return bytes.status();
     const auto more = ParseFields(*bytes);
     if (!more.ok()) return more.status();
-    topics_.emplace(
+    topics_.insert_or_assign(
         *connection,
         MessageTopic{Text(fields, "topic"), Text(*more, "type"), Wire::kRos1});
     return absl::OkStatus();

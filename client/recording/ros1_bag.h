@@ -1,6 +1,7 @@
 // Bags of ROS 1, format 2.0 (wiki.ros.org/Bags/Format/2.0), with chunks that
-// are uncompressed, lz4 or bz2. The index at the end is not used, so that bags
-// that were not closed (.bag.active) are read as well.
+// are uncompressed, lz4 or bz2. Of the index at the end only the connections
+// are used: bags without it, that were not closed (.bag.active), are read as
+// well.
 #pragma once
 
 #include <cstdint>
