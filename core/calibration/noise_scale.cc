@@ -8,6 +8,11 @@ namespace {
 
 // Noise scales are limited to this: beyond it, something else is wrong.
 constexpr double kMostOff = 30;
+// Trackers err by some hundredths of a pixel in ways that depend on the place
+// in the image and on the motion, since they interpolate: these errors do not
+// average out over tracks, so that theta is not more certain than with
+// independent errors of this size.
+constexpr double kLeastPixelNoise_px = 0.05;
 // A scale that is not determined is still nearer to the truth if it exceeds one
 // by more than this many standard deviations.
 constexpr double kOffSigmas = 1;
@@ -32,6 +37,13 @@ auto& Noise(NoiseKind kind, AnyRig& rig) {
       break;
   }
   return rig.imu_noise.accel_bias_random_walk;
+}
+
+double LeastNoise(NoiseKind kind, const Rig& stated) {
+  const double noise = NoiseOf(kind, stated);
+  const double least = noise / kMostOff;
+  if (kind != NoiseKind::kPixel) return least;
+  return std::max(least, std::min(noise, kLeastPixelNoise_px));
 }
 
 }  // namespace
@@ -84,8 +96,9 @@ std::optional<Rig> Reweight(const Rig& stated,
     // uncertainty of the scale.
     const double uncertain =
         std::exp(std::min(scale.log_sigma * scale.log_sigma, kMostUncertain));
-    const double after = std::clamp(
-        scale.factor * uncertain * before, most / (kMostOff * kMostOff), most);
+    const double after = std::clamp(scale.factor * uncertain * before,
+                                    LeastNoise(scale.kind, stated),
+                                    most);
     ScaleNoise(scale.kind, after / before, &next);
     change = std::max(change, std::abs(std::log(after / before)));
   }

@@ -19,6 +19,7 @@ void RunKeyframeRate(Context* context);
 void RunRunTime(Context* context);
 void RunRecordedChoice(Context* context);
 void RunRecordings(Context* context);
+void RunRecordingsRaw(Context* context);
 void RunSensors(Context* context);
 void RunFusion(Context* context);
 void RunSelection(Context* context);
@@ -58,6 +59,9 @@ const std::vector<Experiment>& Experiments() {
       {"recordings",
        "real recordings before and after; are sigmas honest there?",
        RunRecordings},
+      {"recordings_raw",
+       "rendered images and readings to calibrations, from a poor start",
+       RunRecordingsRaw},
       {"recorded_choice",
        "which choice of segments does best on a real recording",
        RunRecordedChoice},

@@ -1,56 +1,244 @@
+// Odometry of a rendered recording against its truth, and on recordings with
+// faults.
 #include "client/odometry/odometry.h"
 
 #include <gtest/gtest.h>
 
-#include "client/recording/recording.h"
-#include "core/calibration/calibrate.h"
-#include "core/calibration/theta_prior.h"
-#include "test/client/tracking/recording_kinds.h"
-#include "test/core/simulation/rigs.h"
+#include <algorithm>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/simulation/simulate.h"
+#include "core/simulation/trajectory.h"
+#include "test/rendering/rendered_source.h"
 
 namespace selfcal::client {
 namespace {
-TEST(Scratch, Folder) {
-  const std::string folder = getenv("REC");
-  auto rec = OpenRecording(folder, {});
-  ASSERT_TRUE(rec.ok()) << rec.status();
-  Rig truth = folder.find("stereo") != std::string::npos ? StereoRig() : HandheldRig("handheld");
-  Rig rig = truth;
-  if (getenv("WRONG")) {
-    rig.factory = WrongStart(truth.factory);
-      rig.blocks = {{"*.time_offset", true}};
-      rig.groups = DefaultGroups(rig.blocks, int(rig.factory.cameras.size()));
-      rig.prior_sigmas = {{"*.focal.*", 20}, {"*.principal.*", 10},
-        {"*.p_CI.*", 0.05},{"*.q_CI.*", 0.06},{"*.time_offset", 0.02}};
+
+constexpr double kSeconds = 10;
+
+const RenderedRecording& Rendered() {
+  static const auto& rendered = *new RenderedRecording(
+      HandheldRig("handheld"), MakeHandheld(kSeconds, 1, 5), RenderOptions{});
+  return rendered;
+}
+
+struct Faults {
+  std::set<int> unreadable = {};
+  int gap_from = 0;
+  int gap_to = 0;
+  bool small = false;  // images of another size
+};
+
+// The recording, rendered once for all tests.
+class Source : public Recording {
+ public:
+  explicit Source(Faults faults = {})
+      : Recording(DataOf(faults)), faults_(std::move(faults)) {}
+
+  absl::StatusOr<GreyPixels> ReadImage(int, int image) override {
+    if (image >= faults_.gap_from) image += faults_.gap_to - faults_.gap_from;
+    if (faults_.unreadable.contains(image)) {
+      return absl::DataLossError("damaged");
+    }
+    if (faults_.small) return GreyPixels{2, 2, {0, 0, 0, 0}};
+    return Images()[static_cast<std::size_t>(image)];
   }
-  Odometry odometry(rec->get(), rig, rig.factory, {.session = "a"});
-  std::vector<MotionSegment> segments;
+
+ private:
+  static const std::vector<GreyPixels>& Images() {
+    static const auto& images = *[] {
+      auto* const all = new std::vector<GreyPixels>;
+      RenderedSource source(Rendered());
+      for (int i = 0; i < Rendered().images(); ++i) {
+        all->push_back(*source.ReadImage(0, i));
+      }
+      return all;
+    }();
+    return images;
+  }
+
+  static RecordedData DataOf(const Faults& faults) {
+    RecordedData data;
+    data.cameras.resize(1);
+    data.cameras[0].name = "cam0";
+    for (int i = 0; i < Rendered().images(); ++i) {
+      if (faults.gap_from <= i && i < faults.gap_to) continue;
+      data.cameras[0].image_times_ns.push_back(Rendered().stamp_ns(i));
+    }
+    data.imu = Rendered().imu().measured;
+    return data;
+  }
+
+  const Faults faults_;
+};
+
+std::vector<OdometrySegment> All(Source* source,
+                                 const OdometryOptions& options) {
+  const Rig rig = HandheldRig("handheld");
+  Odometry odometry(source, rig, rig.factory, options);
+  std::vector<OdometrySegment> segments;
+  for (;;) {
+    auto next = odometry.Next(rig.factory, 3);
+    EXPECT_TRUE(next.ok()) << next.status();
+    if (!next.ok() || !*next) return segments;
+    segments.push_back(**std::move(next));
+  }
+}
+
+// Largest distance of the path from the true one, seen from its first keyframe.
+double PathError_m(const MotionSegment& segment) {
+  const Trajectory& trajectory = Rendered().trajectory();
+  const auto truth = [&](const KeyframeState& x) {
+    return trajectory.At(1e-9 * static_cast<double>(x.t_ns));
+  };
+  const KeyframeState& a = segment.keyframes.front();
+  const auto b = truth(a);
+  double largest = 0;
+  for (const KeyframeState& x : segment.keyframes) {
+    const Eigen::Vector3d estimated = a.q_GI.conjugate() * (x.p_GI - a.p_GI);
+    const Eigen::Vector3d expected =
+        b.q_GI.conjugate() * (truth(x).p_GI - b.p_GI);
+    largest = std::max(largest, (estimated - expected).norm());
+  }
+  return largest;
+}
+
+TEST(Odometry, FindsTheMotionOfARecording) {
+  Source source;
+  const auto segments = All(&source, {.session = "walk", .keyframes = 30});
+  ASSERT_EQ(segments.size(), 3u);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    const MotionSegment& segment = segments[i].segment;
+    EXPECT_EQ(segments[i].failure, "");
+    EXPECT_EQ(segment.key.session, "walk");
+    EXPECT_EQ(segment.key.index, static_cast<std::int64_t>(i));
+    EXPECT_EQ(segment.calibration_version, 3);
+    EXPECT_EQ(segment.keyframes.size(), 30u);
+    EXPECT_GT(segment.observations.size(), 3000u);
+    EXPECT_LT(segments[i].reprojection_rms_px, 0.5);
+    EXPECT_LT(PathError_m(segment), 0.01);
+    EXPECT_TRUE(Validate(segment, Rendered().rig().factory).empty());
+  }
+  // Neighbours can be joined, and are in one frame.
+  for (std::size_t i = 1; i < segments.size(); ++i) {
+    const KeyframeState& next = segments[i].segment.keyframes.front();
+    EXPECT_GE(segments[i - 1].segment.imu.back().t_ns, next.t_ns);
+    const KeyframeState& last = segments[i - 1].segment.keyframes.back();
+    EXPECT_LT((next.p_GI - last.p_GI).norm(), 0.3);
+  }
+}
+
+TEST(Odometry, GivesTheSameSegmentsAgain) {
+  Source source;
+  const auto a = All(&source, {.session = "walk"});
+  const auto b = All(&source, {.session = "walk"});
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const MotionSegment& one = a[i].segment;
+    const MotionSegment& other = b[i].segment;
+    ASSERT_EQ(one.observations.size(), other.observations.size());
+    for (std::size_t k = 0; k < one.keyframes.size(); ++k) {
+      EXPECT_EQ(one.keyframes[k].p_GI, other.keyframes[k].p_GI);
+      EXPECT_EQ(one.keyframes[k].b_a, other.keyframes[k].b_a);
+    }
+    for (std::size_t o = 0; o < one.observations.size(); ++o) {
+      EXPECT_EQ(one.observations[o].z_px, other.observations[o].z_px);
+    }
+  }
+}
+
+TEST(Odometry, ContinuesAfterAStamp) {
+  Source source;
+  const auto all = All(&source, {.session = "walk", .keyframes = 30});
+  ASSERT_EQ(all.size(), 3u);
+  const std::int64_t end_ns = all[0].segment.keyframes.back().t_ns;
+  const auto rest = All(&source,
+                        {.session = "walk",
+                         .first_index = 2,
+                         .after_ns = end_ns,
+                         .keyframes = 30});
+  ASSERT_EQ(rest.size(), 2u);
+  EXPECT_EQ(rest[0].segment.key.index, 2);
+  EXPECT_GT(rest[0].segment.keyframes.front().t_ns, end_ns);
+  EXPECT_LT(PathError_m(rest[0].segment), 0.01);
+  // Landmarks of both are different ones.
+  std::set<std::uint64_t> ids;
+  for (const Landmark& one : all[0].segment.landmarks) ids.insert(one.id);
+  for (const Landmark& one : rest[0].segment.landmarks) {
+    EXPECT_FALSE(ids.contains(one.id));
+  }
+}
+
+TEST(Odometry, BeginsAfreshAfterAGap) {
+  Source source({.gap_from = 90, .gap_to = 120});
+  const auto segments =
+      All(&source, {.session = "walk", .keyframes = 30, .min_keyframes = 10});
+  ASSERT_EQ(segments.size(), 4u);
+  const std::int64_t gap_ns = Rendered().stamp_ns(89);
+  std::int64_t before = -1;
+  std::set<std::uint64_t> ids;
+  for (const OdometrySegment& one : segments) {
+    EXPECT_EQ(one.failure, "");
+    EXPECT_LT(PathError_m(one.segment), 0.01);
+    EXPECT_TRUE(Validate(one.segment, Rendered().rig().factory).empty());
+    const bool after = one.segment.keyframes.front().t_ns > gap_ns;
+    EXPECT_TRUE(after || one.segment.keyframes.back().t_ns <= gap_ns);
+    if (after && before >= 0) {
+      EXPECT_GT(one.segment.key.index, before + 1);
+      for (const Landmark& landmark : one.segment.landmarks) {
+        EXPECT_FALSE(ids.contains(landmark.id));
+      }
+      before = -1;
+    } else if (!after) {
+      before = one.segment.key.index;
+      for (const Landmark& landmark : one.segment.landmarks) {
+        ids.insert(landmark.id);
+      }
+    }
+  }
+}
+
+TEST(Odometry, LeavesOutImagesThatCannotBeRead) {
+  Source source({.unreadable = {30, 31, 77, 140}});
+  const Rig rig = HandheldRig("handheld");
+  Odometry odometry(&source, rig, rig.factory, {.session = "walk"});
+  int found = 0;
   for (;;) {
     auto next = odometry.Next(rig.factory, 1);
-    ASSERT_TRUE(next.ok()) << next.status();
+    ASSERT_TRUE(next.ok());
     if (!*next) break;
-    std::printf("%d: %s kf %zu lm %zu obs %zu rms %.2f bg %.4f\n", int((*next)->segment.key.index), (*next)->failure.c_str(),
-       (*next)->segment.keyframes.size(), (*next)->segment.landmarks.size(), (*next)->segment.observations.size(), (*next)->reprojection_rms_px, (*next)->segment.keyframes[0].b_g.norm());
-    for (auto& v : Validate((*next)->segment, rig.factory)) std::printf("  %s %s\n", v.field.c_str(), v.message.c_str());
-    if ((*next)->failure.empty()) segments.push_back((*next)->segment);
+    EXPECT_EQ((*next)->failure, "");
+    EXPECT_LT(PathError_m((*next)->segment), 0.01);
+    ++found;
   }
-        CalibrateOptions o;
-        o.prior = FactoryPrior(rig);
-        const CalibrationResult r = Calibrate(rig, rig.factory, segments, o);
-        const Eigen::VectorXd d = BoxMinus(r.theta, truth.factory);
-        double nees = 0;
-        if (r.covariance.size()) {
-          const auto f = FreeComponents(rig);
-          nees = d(f).dot(Eigen::MatrixXd(r.covariance(f, f)).ldlt().solve(Eigen::VectorXd(d(f))));
-          auto comps = TangentComponents(rig.factory);
-          for (int i : f) std::printf("   %s %.6g sigma %.6g (%.1f)\n", comps[i].name.c_str(), d(i), std::sqrt(r.covariance(i,i)), d(i)/std::sqrt(r.covariance(i,i)));
-        }
-        const auto& c = r.theta.cameras[0];
-        const auto& tc = truth.factory.cameras[0];
-        std::printf("status %d %s its %d seg %d rms %.2f NEES %.1f of %d df %.2f dc %.2f dq %.4f dp %.4f dt %.4f held %zu track noise %.2f\n",
-          int(r.status), r.message.c_str(), r.iterations, r.segments, r.reprojection_rms_after_px, nees, int(FreeComponents(rig).size()),
-          (c.f - tc.f).norm(), (c.c - tc.c).norm(), c.q_CI.angularDistance(tc.q_CI), (c.p_CI - tc.p_CI).norm(), c.time_offset_s - tc.time_offset_s, r.held_constant.size(), r.track_noise_factor);
-  for (auto& n : r.noise_scales) std::printf("noise %d %.3f +- %.3f\n", int(n.kind), n.factor, n.log_sigma);
+  EXPECT_EQ(found, 3);
+  EXPECT_EQ(odometry.progress().unreadable, 4u);
+  EXPECT_EQ(odometry.progress().last_error, "damaged");
 }
+
+TEST(Odometry, EndsIfMostImagesCannotBeRead) {
+  Faults faults;
+  for (int i = 0; i < 1000; ++i) faults.unreadable.insert(i);
+  Source source(faults);
+  const Rig rig = HandheldRig("handheld");
+  Odometry odometry(&source, rig, rig.factory, {.session = "walk"});
+  const auto next = odometry.Next(rig.factory, 1);
+  EXPECT_EQ(next.status().code(), absl::StatusCode::kDataLoss);
 }
+
+TEST(Odometry, RefusesImagesOfAnotherSize) {
+  Source source({.small = true});
+  const Rig rig = HandheldRig("handheld");
+  Odometry odometry(&source, rig, rig.factory, {.session = "walk"});
+  const auto next = odometry.Next(rig.factory, 1);
+  EXPECT_EQ(next.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(next.status().message(),
+            "the images of cam0 have 2 x 2 px, while the calibration is for "
+            "640 x 480 px");
 }
+
+}  // namespace
+}  // namespace selfcal::client

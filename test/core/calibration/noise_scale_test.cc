@@ -75,5 +75,20 @@ TEST(Reweight, StaysWithinBoundsOfTheStatedNoise) {
   EXPECT_NEAR(Gyro(*least), Gyro(rig) / 30, 1e-12);
 }
 
+TEST(Reweight, TakesNoPixelsForBetterThanATrackerIs) {
+  Rig rig = HandheldRig("r");
+  rig.pixel_sigma_px = 0.5;
+  const auto next = Reweight(rig, rig, {{NoiseKind::kPixel, 0.04, 0.01}});
+  ASSERT_TRUE(next.has_value());
+  EXPECT_DOUBLE_EQ(next->pixel_sigma_px, 0.05);
+  // A rig may state less, and more is possible.
+  rig.pixel_sigma_px = 0.02;
+  EXPECT_FALSE(Reweight(rig, rig, {{NoiseKind::kPixel, 0.5, 0.01}}));
+  EXPECT_NEAR(
+      Reweight(rig, rig, {{NoiseKind::kPixel, 4, 0.01}})->pixel_sigma_px,
+      0.08,
+      1e-4);
+}
+
 }  // namespace
 }  // namespace selfcal
