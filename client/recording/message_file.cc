@@ -47,9 +47,7 @@ absl::StatusOr<std::unique_ptr<MessageFile>> OpenMessageFile(
   if (magic.starts_with(kSqlite)) return OpenSqliteBag(path);
   if (magic.starts_with(kOldRos1Bag)) {
     return absl::InvalidArgumentError(fmt::format(
-        "{}: a bag of version 1, from before 2010: convert it with `rosbag "
-        "fix`",
-        path));
+        "{}: a bag of version 1: only version 2.0, of 2010, is read", path));
   }
   if (magic.starts_with(kZstd)) {
     return absl::InvalidArgumentError(fmt::format(

@@ -65,8 +65,10 @@ absl::StatusOr<std::unique_ptr<Recording>> OpenRecording(
         fmt::format("{}: there is no such file or folder", path));
   }
   if (!fs::is_directory(status)) return OpenBag(path, options);
-  if (IsEurocFolder(path)) return OpenEurocFolder(path);
+  // The images of a list may be in a folder cam0, which EuRoC's format has,
+  // too.
   if (IsCsvFolder(path)) return OpenCsvFolder(path);
+  if (IsEurocFolder(path)) return OpenEurocFolder(path);
   if (IsBagFolder(path)) return OpenBag(path, options);
   return absl::InvalidArgumentError(fmt::format(
       "{}: not a recording: the folder has neither mav0 nor cam0.csv nor a bag",

@@ -344,8 +344,7 @@ TEST_F(BrokenBag, OtherFilesAreNoRecordings) {
   }
   EXPECT_EQ(Error(Write("file", "#ROSBAG V1.2\n")),
             folder_.File("file") +
-                ": a bag of version 1, from before 2010: convert it with "
-                "`rosbag fix`");
+                ": a bag of version 1: only version 2.0, of 2010, is read");
 }
 
 TEST_F(BrokenBag, CutOffFileIsReadAsFarAsItGoes) {

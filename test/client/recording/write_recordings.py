@@ -14,8 +14,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 
 import numpy as np
-from mcap.writer import CompressionType, IndexType
-from mcap.writer import Writer as McapWriter
+from mcap.writer import CompressionType, IndexType, Writer as McapWriter
 from PIL import Image
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_typestore
@@ -130,7 +129,8 @@ class Messages:
             "r": np.eye(3).reshape(-1),
             "p": np.eye(3, 4).reshape(-1),
         }
-        lower |= {key: changes.pop(key) for key in list(changes) if key in lower}
+        for key in list(lower):
+            lower[key] = changes.pop(key, lower[key])
         matrices = (
             {key.upper(): value for key, value in lower.items()}
             if self.store is ROS1
@@ -155,9 +155,11 @@ class Messages:
         message = self.make(INFO, **(fields | matrices | changes))
         return "/cam0/camera_info", INFO, BEGIN_NS, message
 
-    def images(self, kind="raw", cameras=CAMERAS):
+    def images(self, kind="raw"):
         return [
-            self.image(j, k, kind) for k in range(IMAGES) for j in range(cameras)
+            self.image(j, k, kind)
+            for k in range(IMAGES)
+            for j in range(CAMERAS)
         ]
 
     def readings(self, topic="/imu0"):
@@ -246,10 +248,11 @@ def write_folders() -> None:
         imu.append(",".join([str(t_ns), *(repr(value) for value in values)]))
     heading = imu[0].removeprefix("#")
     for name in ("euroc", "tum_vi", "csv"):
+        is_csv = name == "csv"
         root = FOLDER / name
         for j in range(CAMERAS):
             lines = ["#timestamp [ns],filename"]
-            folder = root / f"mav0/cam{j}/data" if name != "csv" else root / f"left{j}"
+            folder = root / (f"cam{j}" if is_csv else f"mav0/cam{j}/data")
             folder.mkdir(parents=True)
             for k in range(IMAGES):
                 array = pixels(j, k)
@@ -259,12 +262,12 @@ def write_folders() -> None:
                 file = {
                     "euroc": f"{image_ns(k)}.png",
                     "tum_vi": f"{image_ns(k)}",
-                    "csv": f"left{j}/{image_ns(k)}.png",
+                    "csv": f"cam{j}/{image_ns(k)}.png",
                 }[name]
                 lines.append(f"{image_ns(k)},{file}")
-            path = root / f"cam{j}.csv" if name == "csv" else folder.parent / "data.csv"
+            path = root / f"cam{j}.csv" if is_csv else folder / "../data.csv"
             path.write_text("\n".join(lines) + "\n")
-        if name == "csv":
+        if is_csv:
             (root / "imu.csv").write_text("\n".join([heading, *imu[1:]]))
         else:
             (root / "mav0/imu0").mkdir()
@@ -273,10 +276,10 @@ def write_folders() -> None:
 
 def write_bags() -> None:
     ros1, ros2 = Messages(ROS1), Messages(ROS2)
-    lz4, bz2 = rosbag1.Writer.CompressionFormat.LZ4, rosbag1.Writer.CompressionFormat.BZ2
     write_ros1("ros1_none.bag", None, ros1.all())
-    write_ros1("ros1_lz4.bag", lz4, ros1.all())
-    write_ros1("ros1_bz2.bag", bz2, ros1.all())
+    formats = rosbag1.Writer.CompressionFormat
+    write_ros1("ros1_lz4.bag", formats.LZ4, ros1.all())
+    write_ros1("ros1_bz2.bag", formats.BZ2, ros1.all())
     write_ros1("ros1_png.bag", None, ros1.all("png"))
     modes = rosbag2.CompressionMode
     sqlite, mcap = rosbag2.StoragePlugin.SQLITE3, rosbag2.StoragePlugin.MCAP
