@@ -1,5 +1,6 @@
 // calibrate: from recordings to a calibration, with a daemon of its own.
 #include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,17 +19,21 @@
 #include "client/cli/foreign_files.h"
 #include "client/cli/positive_number.h"
 #include "client/cli/preflight_subject.h"
+#include "client/cli/progress.h"
 #include "client/cli/recorded_rig.h"
 #include "client/cli/recorded_sessions.h"
 #include "client/cli/recording_feed.h"
 #include "client/cli/rig_input.h"
 #include "client/cli/rig_options.h"
 #include "client/cli/run_following.h"
+#include "client/odometry/start.h"
 #include "client/process/daemon_process.h"
 #include "client/text/text.h"
+#include "proto/convert.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
 #include "selfcal/v1/rig.grpc.pb.h"
+#include "selfcal/v1/segment.grpc.pb.h"
 
 namespace selfcal::client {
 namespace {
@@ -68,6 +73,29 @@ std::string FindDaemon() {
   return "selfcald";
 }
 
+// Replaces the calibration of the rig by a start that the first recording
+// gives.
+int MoveToStart(const std::vector<RecordedSession>& sessions, v1::Rig* rig) {
+  Rig known;
+  const auto faults = FromProto(*rig, "rig", &known);
+  if (!faults.empty()) return kDone;  // the daemon lists them
+  // Blocks that the daemon would add, and groups.
+  AddEstimatedBlocks(known.blocks, &known.factory);
+  known.groups = DefaultGroups(known.blocks, known.factory);
+  Progress progress("start");
+  progress.Say("calibrating on the first 40 s");
+  const auto start = FindStart(sessions.front().recording.get(), known);
+  progress.Clear();
+  if (absl::IsNotFound(start.status())) {
+    PrintError(fmt::format("no better start than the given one was found: {}",
+                           std::string(start.status().message())));
+    return kDone;
+  }
+  if (!start.ok()) return FailInput(start.status());
+  *rig->mutable_factory() = ToProto(start->theta);
+  return kDone;
+}
+
 // Creates the rig from what the command line and the recordings say, unless the
 // state has it already.
 int EnsureRig(Context* context,
@@ -80,10 +108,11 @@ int EnsureRig(Context* context,
     return Fail(*context, status);
   }
   std::vector<Loss> losses;
-  const auto rig = ReadRecordedRig(
+  auto rig = ReadRecordedRig(
       input.rig, input.from, *sessions.front().recording, &losses);
   PrintLosses(losses);
   if (!rig.ok()) return FailInput(rig.status());
+  if (const int code = MoveToStart(sessions, &*rig); code != kDone) return code;
   using RigService = v1::RigService::StubInterface;
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::CreateRigRequest request;
@@ -94,29 +123,67 @@ int EnsureRig(Context* context,
   return status.ok() ? kDone : Fail(*context, status);
 }
 
-// Calibrates on all segments. Without a change since the last run, that has the
-// result.
+// The newest run; without a name if there is none.
+grpc::Status NewestRun(v1::RecalibrationService::StubInterface* stub,
+                       const std::string& rig,
+                       v1::Recalibration* run) {
+  using Service = v1::RecalibrationService::StubInterface;
+  v1::ListRecalibrationsRequest request;
+  request.set_parent(RigName(rig));
+  request.set_page_size(1);
+  v1::ListRecalibrationsResponse listed;
+  const grpc::Status status =
+      Call<Service>(stub, &Service::ListRecalibrations, request, &listed);
+  if (status.ok() && !listed.recalibrations().empty()) {
+    *run = listed.recalibrations(0);
+  }
+  return status;
+}
+
+// Whether all segments arrived before a run was created.
+grpc::Status HasAllSegments(Context* context,
+                            const std::string& rig,
+                            const v1::Recalibration& run,
+                            bool* all) {
+  using Service = v1::SegmentService::StubInterface;
+  const auto stub = v1::SegmentService::NewStub(context->Channel());
+  v1::ListSegmentsRequest request;
+  request.set_parent(RigName(rig));
+  request.set_order_by("receive_time desc");
+  request.set_page_size(1);
+  request.set_view(v1::ListSegmentsRequest::BASIC);
+  v1::ListSegmentsResponse listed;
+  const grpc::Status status =
+      Call<Service>(stub.get(), &Service::ListSegments, request, &listed);
+  *all = status.ok() && !listed.segments().empty() &&
+         google::protobuf::util::TimeUtil::TimestampToNanoseconds(
+             listed.segments(0).receive_time()) <=
+             google::protobuf::util::TimeUtil::TimestampToNanoseconds(
+                 run.create_time());
+  return status;
+}
+
+// Calibrates on all segments, unless a run has succeeded since the last of them
+// came, and shows the result.
 int Recalibrate(Context* context, const std::string& rig) {
   using Service = v1::RecalibrationService::StubInterface;
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
+  v1::Recalibration last;
+  grpc::Status status = NewestRun(stub.get(), rig, &last);
+  bool done = false;
+  if (status.ok() && last.state() == v1::Recalibration::SUCCEEDED) {
+    status = HasAllSegments(context, rig, last, &done);
+  }
+  if (!status.ok()) return Fail(*context, status);
+  if (done) return FollowRun(context, stub.get(), std::move(last));
   v1::StartRecalibrationRequest request;
   request.set_parent(RigName(rig));
+  request.set_force(true);
   v1::Recalibration run;
-  const grpc::Status status =
+  status =
       Call<Service>(stub.get(), &Service::StartRecalibration, request, &run);
-  if (status.ok()) return FollowRun(context, stub.get(), std::move(run));
-  if (status.error_code() != grpc::StatusCode::FAILED_PRECONDITION) {
-    return Fail(*context, status);
-  }
-  v1::ListRecalibrationsRequest list;
-  list.set_parent(RigName(rig));
-  list.set_page_size(1);
-  v1::ListRecalibrationsResponse listed;
-  const grpc::Status found =
-      Call<Service>(stub.get(), &Service::ListRecalibrations, list, &listed);
-  if (!found.ok()) return Fail(*context, found);
-  if (listed.recalibrations().empty()) return Fail(*context, status);
-  return FollowRun(context, stub.get(), listed.recalibrations(0));
+  return status.ok() ? FollowRun(context, stub.get(), std::move(run))
+                     : Fail(*context, status);
 }
 
 void WarnOfMistakes(Context* context, const std::string& rig) {

@@ -1,0 +1,242 @@
+"""selfcal calibrate and track on rendered recordings, against real daemons.
+
+calibrate_test.py SELFCAL SELFCALD RENDER
+"""
+
+import json
+import math
+import pathlib
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import zlib
+
+SELFCAL, SELFCALD, RENDER = sys.argv[1:4]
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
+
+from running_daemon import RunningDaemon
+
+SECONDS = 18
+
+
+def render(folder: pathlib.Path, *options: str) -> pathlib.Path:
+    subprocess.run(
+        [RENDER, folder, "--device", "handheld", "--exposure-ms", "2", *options],
+        check=True,
+        stderr=subprocess.DEVNULL,
+    )
+    return folder
+
+
+def command(recording: pathlib.Path, output: pathlib.Path, *options: str) -> list:
+    return [SELFCAL, "calibrate", recording, "--output", output,
+            "--selfcald", SELFCALD, *options]  # fmt: skip
+
+
+def calibrate(recording: pathlib.Path, output: pathlib.Path, *options: str):
+    return subprocess.run(
+        command(recording, output, *options), capture_output=True, text=True
+    )
+
+
+def parameters(output: pathlib.Path) -> dict:
+    return json.loads((output / "calibration.json").read_text())["parameters"]
+
+
+class Calibrate(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        cls.walk = render(cls.folder / "walk", "--seconds", str(SECONDS))
+        # A start that is off by 5 % and 10 px.
+        sensor = cls.walk / "mav0/cam0/sensor.yaml"
+        sensor.write_text(
+            re.sub(
+                r"intrinsics: \[(.*)\]",
+                lambda found: "intrinsics: "
+                + str(
+                    [
+                        scale * float(value) + shift
+                        for value, scale, shift in zip(
+                            found[1].split(","), (1.05, 1.05, 1, 1), (0, 0, 10, -10)
+                        )
+                    ]
+                ),
+                sensor.read_text(),
+            )
+        )
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        shutil.rmtree(cls.folder)
+
+    def check_against_truth(self, output: pathlib.Path) -> None:
+        truth = json.loads((self.walk / "calibration.json").read_text())
+        found = parameters(output)["cameras"][0]
+        true = truth["cameras"][0]
+        for axis in "xy":
+            self.assertLess(abs(found["f"][axis] - true["f"][axis]), 0.5)
+            self.assertLess(abs(found["c"][axis] - true["c"][axis]), 0.5)
+        for axis in "xyz":
+            self.assertLess(abs(found["p_ci"][axis] - true["p_ci"][axis]), 5e-3)
+        dot = sum(found["q_ci"][a] * true["q_ci"][a] for a in "wxyz")
+        self.assertLess(2 * math.acos(min(1, abs(dot))), 2e-3)
+
+    def test_from_a_recording_to_files(self) -> None:
+        output = self.folder / "output"
+        done = calibrate(self.walk, output)
+        self.assertIn(done.returncode, (0, 5), done.stderr)
+        self.assertIn("segments stored", done.stderr)
+        self.check_against_truth(output)
+        self.assertTrue((output / "report.html").stat().st_size > 10000)
+        self.assertTrue((output / "kalibr/camchain-imucam.yaml").exists())
+        # A tool that has no such camera model is named.
+        self.assertIn("no files for openvins", done.stderr)
+
+        # Nothing is left to do, and the result is the same.
+        before = parameters(output)
+        again = calibrate(self.walk, output)
+        self.assertEqual(again.returncode, done.returncode, again.stderr)
+        self.assertIn("0 segments stored", again.stderr)
+        self.assertEqual(parameters(output), before)
+
+        # The same recording gives the same bits.
+        other = self.folder / "other"
+        self.assertEqual(calibrate(self.walk, other).returncode, done.returncode)
+        self.assertEqual(parameters(other), before)
+
+        # The state can be served.
+        daemon = RunningDaemon(SELFCALD, f"{output}/state")
+        self.addCleanup(daemon.stop)
+        listed = subprocess.run(
+            [SELFCAL, "--target", daemon.target, "rig", "list"],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        self.assertIn("device", listed.stdout)
+
+    def test_continues_after_sigkill(self) -> None:
+        output = self.folder / "killed"
+        process = subprocess.Popen(
+            command(self.walk, output),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        log = pathlib.Path(f"{output}/state.log")
+        limit = time.monotonic() + 120
+        while not (log.exists() and "is scored" in log.read_text()):
+            self.assertLess(time.monotonic(), limit, "no segment in time")
+            time.sleep(0.05)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        scored = log.read_text().count("is scored")
+        self.assertLess(scored, 4)
+        done = calibrate(self.walk, output)
+        self.assertIn(done.returncode, (0, 5), done.stderr)
+        self.assertGreater(log.read_text().count("is scored"), scored)
+        self.check_against_truth(output)
+
+    def test_track_streams_to_a_daemon(self) -> None:
+        daemon = RunningDaemon(SELFCALD, f"{self.folder}/served")
+        self.addCleanup(daemon.stop)
+        target = ["--target", daemon.target]
+        created = self.folder / "rig.json"
+        truth = json.loads((self.walk / "calibration.json").read_text())
+        created.write_text(
+            json.dumps(
+                {
+                    "name": "rigs/hand",
+                    "factory": truth,
+                    "imuNoise": {
+                        "gyroNoiseDensity": 1.7e-4,
+                        "accelNoiseDensity": 2e-3,
+                        "gyroBiasRandomWalk": 2e-5,
+                        "accelBiasRandomWalk": 3e-3,
+                    },
+                    "pixelSigmaPx": 0.5,
+                }
+            )
+        )
+        subprocess.run(
+            [SELFCAL, *target, "rig", "create", created],
+            check=True,
+            capture_output=True,
+        )
+        sent = subprocess.run(
+            [SELFCAL, *target, "track", "hand", self.walk],
+            capture_output=True,
+            text=True,
+        )
+        self.assertEqual(sent.returncode, 0, sent.stderr)
+        listed = subprocess.run(
+            [SELFCAL, *target, "segment", "list", "hand"],
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        self.assertEqual(len(listed.stdout.splitlines()), 5)
+
+
+class Broken(unittest.TestCase):
+    """One sentence and a code for each."""
+
+    def setUp(self) -> None:
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def expect(self, recording: pathlib.Path, text: str, *options: str) -> None:
+        done = calibrate(recording, self.folder / "output", *options)
+        self.assertIn(done.returncode, (1, 2), done.stderr)
+        self.assertIn(text, done.stderr)
+
+    def test_no_recording(self) -> None:
+        self.expect(self.folder / "nothing", "nothing")
+
+    def test_no_motion(self) -> None:
+        still = render(self.folder / "still", "--seconds", "8", "--excitation", "0")
+        self.expect(still, "no motion was found")
+
+    def test_all_dark(self) -> None:
+        dark = render(self.folder / "dark", "--seconds", "5")
+        first = min((dark / "mav0/cam0/data").iterdir())
+        black = self.folder / "black.png"
+        # A PNG of zeros with the size of the others.
+        def chunk(kind: bytes, data: bytes) -> bytes:
+            body = kind + data
+            return struct.pack(">I", len(data)) + body + struct.pack(
+                ">I", zlib.crc32(body)
+            )
+
+        header = struct.pack(">IIBBBBB", 640, 480, 8, 0, 0, 0, 0)
+        black.write_bytes(
+            b"\x89PNG\r\n\x1a\n"
+            + chunk(b"IHDR", header)
+            + chunk(b"IDAT", zlib.compress(bytes(641 * 480)))
+            + chunk(b"IEND", b"")
+        )
+        for image in first.parent.iterdir():
+            shutil.copy(black, image)
+        self.expect(dark, "no motion was found")
+
+    def test_images_of_another_size(self) -> None:
+        small = render(self.folder / "small", "--seconds", "2")
+        sensor = small / "mav0/cam0/sensor.yaml"
+        sensor.write_text(sensor.read_text().replace("480", "400"))
+        self.expect(small, "640 x 480")
+
+    def test_no_calibration(self) -> None:
+        bare = render(self.folder / "bare", "--seconds", "2")
+        (bare / "mav0/cam0/sensor.yaml").unlink()
+        self.expect(bare, "does not state the calibration of cam0")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
