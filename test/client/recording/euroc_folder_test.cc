@@ -110,6 +110,7 @@ TEST_F(EurocReader, WhatWasWrittenIsReadToTheBit) {
     }
     const CameraCalibration& truth = rendered_->rig().factory.cameras[j];
     ASSERT_TRUE(camera.calibration);
+    EXPECT_TRUE(camera.has_pose);
     EXPECT_EQ(camera.calibration->f, truth.f);
     EXPECT_EQ(camera.calibration->model, truth.model);
     EXPECT_EQ(camera.calibration->distortion, truth.distortion);
@@ -309,6 +310,7 @@ TEST(EurocImages, RealImagesAreTracked) {
   Calibration theta;
   for (const RecordedCamera& camera : (*recording)->cameras()) {
     ASSERT_TRUE(camera.calibration);
+    EXPECT_TRUE(camera.has_pose);
     theta.cameras.push_back(*camera.calibration);
   }
   const std::vector<TrackPoint> points = TrackAll(**recording, theta);
