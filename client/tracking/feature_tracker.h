@@ -22,10 +22,10 @@
 #include <vector>
 
 #include "client/tracking/corner_grid.h"
-#include "client/tracking/epipolar_check.h"
-#include "client/tracking/gyro_rotation.h"
 #include "client/tracking/patch_flow.h"
 #include "client/tracking/patch_template.h"
+#include "core/initialisation/epipolar_check.h"
+#include "core/initialisation/gyro_rotation.h"
 #include "core/model/calibration.h"
 
 namespace selfcal::client {

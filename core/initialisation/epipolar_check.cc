@@ -1,4 +1,4 @@
-#include "client/tracking/epipolar_check.h"
+#include "core/initialisation/epipolar_check.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -6,10 +6,11 @@
 #include <limits>
 #include <random>
 
+#include "core/initialisation/epipolar_row.h"
 #include "core/model/median.h"
 #include "core/model/so3.h"
 
-namespace selfcal::client {
+namespace selfcal {
 namespace {
 
 // Steps at each scale of the residuals, and the ratio of two scales.
@@ -128,22 +129,17 @@ class Fitter {
     Matrix5 H = Matrix5::Zero();
     Vector5 g = Vector5::Zero();
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
-      const Eigen::Vector3d& b = pairs_[i].b;
-      const Eigen::Vector3d& c = rotated_[i];
-      const double length = t_.cross(c).norm();
-      if (length < 1e-3) continue;
-      const double to_px = options_.px_per_rad / length;
-      const double r = to_px * b.dot(t_.cross(c));
-      const double ratio = r / scale_px;
+      EpipolarRow row;
+      if (!MakeEpipolarRow(
+              t_, rotated_[i], pairs_[i].b, options_.px_per_rad, &row)) {
+        continue;
+      }
+      const double ratio = row.r / scale_px;
       const double weight = 1 / std::pow(1 + ratio * ratio, 2);
       Vector5 J;
-      J.head<3>() = t_.dot(c) * b - b.dot(c) * t_;
-      const Eigen::Vector3d by_t = c.cross(b);
-      J[3] = by_t.dot(u);
-      J[4] = by_t.dot(v);
-      J *= to_px;
+      J << row.by_rotation, row.by_direction.dot(u), row.by_direction.dot(v);
       H += weight * J * J.transpose();
-      g += weight * r * J;
+      g += weight * row.r * J;
     }
     const double prior = std::pow(scale_px / options_.rotation_sigma_rad, 2);
     const Eigen::Vector3d offset = Log(q_ * given_.conjugate());
@@ -200,4 +196,4 @@ EpipolarFit CheckEpipolar(const std::vector<RayPair>& pairs,
       std::max(options.max_distance_px, kSigmas * fitter.RobustSigma()));
 }
 
-}  // namespace selfcal::client
+}  // namespace selfcal

@@ -14,7 +14,7 @@
 #include <optional>
 #include <vector>
 
-namespace selfcal::client {
+namespace selfcal {
 
 struct RayPair {
   Eigen::Vector3d a;  // unit, in A
@@ -52,4 +52,4 @@ EpipolarFit CheckEpipolar(
     const EpipolarOptions& options,
     const std::optional<Eigen::Vector3d>& t_B = std::nullopt);
 
-}  // namespace selfcal::client
+}  // namespace selfcal

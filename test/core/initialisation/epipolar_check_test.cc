@@ -1,4 +1,4 @@
-#include "client/tracking/epipolar_check.h"
+#include "core/initialisation/epipolar_check.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "core/model/so3.h"
 #include "test/core/model/random_values.h"
 
-namespace selfcal::client {
+namespace selfcal {
 namespace {
 
 constexpr double kPxPerRad = 400;
@@ -138,4 +138,4 @@ TEST(EpipolarCheck, AcceptsTooFewPairsUnchecked) {
 }
 
 }  // namespace
-}  // namespace selfcal::client
+}  // namespace selfcal

@@ -1,4 +1,4 @@
-#include "client/tracking/gyro_rotation.h"
+#include "core/initialisation/gyro_rotation.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "core/simulation/imu_readings.h"
 #include "core/simulation/simulate.h"
 
-namespace selfcal::client {
+namespace selfcal {
 namespace {
 
 ImuSample SampleAt(double t_s, const Eigen::Vector3d& gyro) {
@@ -62,6 +62,38 @@ TEST(GyroRotation, FollowsTheRotationOfATrajectory) {
   }
 }
 
+TEST(GyroRotation, DerivativeByTheBiasIsThatOfDifferences) {
+  ImuCalibration imu;
+  imu.s_g = {1.1, 0.9, 1.05};
+  imu.m_g = {0.01, 0.02, -0.01};
+  const auto with_bias = [&](const Eigen::Vector3d& b_g) {
+    GyroRotation rotation(imu, b_g);
+    for (int i = 0; i < 100; ++i) {
+      rotation.Add(SampleAt(
+          0.005 * i, {2 * std::sin(0.2 * i), 1 + std::cos(0.1 * i), 0.03 * i}));
+    }
+    return rotation;
+  };
+  const Eigen::Vector3d b_g(0.02, -0.05, 0.08);
+  const double from_s = 0.0512, to_s = 0.3537;
+  const Eigen::Matrix3d J = with_bias(b_g).BetweenByBias(from_s, to_s);
+  constexpr double kStep = 1e-4;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(i);
+    const Eigen::Vector3d difference =
+        Log(with_bias(b_g - step).Between(from_s, to_s).conjugate() *
+            with_bias(b_g + step).Between(from_s, to_s)) /
+        (2 * kStep);
+    // The integral of the rotation is by the rule of the middle.
+    EXPECT_LT((J.col(i) - difference).norm(), 1e-5) << i;
+  }
+  // Rotations are about the mean rate of a step, whose direction changes.
+  EXPECT_LT((with_bias(b_g).RateAt(from_s) -
+             Log(with_bias(b_g).Between(from_s - 1e-4, from_s + 1e-4)) / 2e-4)
+                .norm(),
+            1e-4);
+}
+
 TEST(GyroRotation, KeepsWhatIsNeededAfterATime) {
   GyroRotation all{ImuCalibration()};
   GyroRotation dropped{ImuCalibration()};
@@ -87,4 +119,4 @@ TEST(GyroRotation, IgnoresSamplesOutOfOrderAndIsTheIdentityWithoutAny) {
 }
 
 }  // namespace
-}  // namespace selfcal::client
+}  // namespace selfcal
