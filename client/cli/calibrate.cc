@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "client/cli/calibration_results.h"
+#include "client/cli/choice.h"
 #include "client/cli/commands.h"
 #include "client/cli/device_data.h"
 #include "client/cli/diagnosis_text.h"
@@ -29,6 +30,7 @@
 #include "client/odometry/start.h"
 #include "client/process/daemon_process.h"
 #include "client/text/text.h"
+#include "core/model/camera_model.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
@@ -48,6 +50,7 @@ struct CalibrateInput {
   RigInput rig;
   std::vector<std::string> from;  // the tool, and its files
   std::string output;
+  std::string camera_model = "radial-tangential";  // of cameras not stated
   std::string daemon;  // path of selfcald; empty: found
 };
 
@@ -73,26 +76,43 @@ std::string FindDaemon() {
   return "selfcald";
 }
 
+// The command line has checked the name.
+DistortionModel ModelNamed(const std::string& name) {
+  const auto models = DistortionModels();
+  return *std::find_if(
+      models.begin(), models.end(), [&](DistortionModel model) {
+        return DistortionName(model) == name;
+      });
+}
+
 // Replaces the calibration of the rig by a start that the first recording
 // gives.
-int MoveToStart(const std::vector<RecordedSession>& sessions, v1::Rig* rig) {
+int MoveToStart(const std::vector<RecordedSession>& sessions,
+                RecordedRig* recorded) {
   Rig known;
-  const auto faults = FromProto(*rig, "rig", &known);
+  const auto faults = FromProto(recorded->rig, "rig", &known);
   if (!faults.empty()) return kDone;  // the daemon lists them
   // Blocks that the daemon would add, and groups.
   AddEstimatedBlocks(known.blocks, &known.factory);
   known.groups = DefaultGroups(known.blocks, known.factory);
   Progress progress("start");
   progress.Say("calibrating on the first 40 s");
-  const auto start = FindStart(sessions.front().recording.get(), known);
+  const auto start =
+      FindStart(sessions.front().recording.get(), known, recorded->unknown);
   progress.Clear();
-  if (absl::IsNotFound(start.status())) {
-    PrintError(fmt::format("no better start than the given one was found: {}",
-                           std::string(start.status().message())));
+  if (start.ok()) {
+    *recorded->rig.mutable_factory() = ToProto(start->theta);
     return kDone;
   }
-  if (!start.ok()) return FailInput(start.status());
-  *rig->mutable_factory() = ToProto(start->theta);
+  const bool needed = std::any_of(
+      recorded->unknown.begin(),
+      recorded->unknown.end(),
+      [](const UnknownOfCamera& one) { return one.rotation || one.focal; });
+  if (needed || !absl::IsNotFound(start.status())) {
+    return FailInput(start.status());
+  }
+  PrintError(fmt::format("no better start than the given one was found: {}",
+                         std::string(start.status().message())));
   return kDone;
 }
 
@@ -108,15 +128,20 @@ int EnsureRig(Context* context,
     return Fail(*context, status);
   }
   std::vector<Loss> losses;
-  auto rig = ReadRecordedRig(
-      input.rig, input.from, *sessions.front().recording, &losses);
+  auto recorded = ReadRecordedRig(input.rig,
+                                  input.from,
+                                  ModelNamed(input.camera_model),
+                                  sessions.front().recording.get(),
+                                  &losses);
   PrintLosses(losses);
-  if (!rig.ok()) return FailInput(rig.status());
-  if (const int code = MoveToStart(sessions, &*rig); code != kDone) return code;
+  if (!recorded.ok()) return FailInput(recorded.status());
+  if (const int code = MoveToStart(sessions, &*recorded); code != kDone) {
+    return code;
+  }
   using RigService = v1::RigService::StubInterface;
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::CreateRigRequest request;
-  *request.mutable_rig() = *rig;
+  *request.mutable_rig() = recorded->rig;
   v1::Rig created;
   status =
       Call<RigService>(stub.get(), &RigService::CreateRig, request, &created);
@@ -288,6 +313,19 @@ void AddCalibrate(CLI::App* app, Context* context) {
                    "transform that takes points from the IMU's frame to the "
                    "camera's (z forward), as tf shows it; repeatable")
       ->allow_extra_args(false);
+  std::vector<std::string> models;
+  for (const DistortionModel model : DistortionModels()) {
+    models.emplace_back(DistortionName(model));
+  }
+  command
+      ->add_option("--camera-model",
+                   input->camera_model,
+                   "Model of a camera without a calibration, whose values are "
+                   "guessed then: a lens that sees 100 degrees or more needs "
+                   "fov, equidistant, unified, extended-unified or "
+                   "double-sphere")
+      ->check(OneOf(models))
+      ->capture_default_str();
   command
       ->add_option("--cameras",
                    input->rig.cameras,

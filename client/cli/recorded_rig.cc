@@ -7,7 +7,8 @@
 #include <cstdint>
 
 #include "client/cli/extrinsics_input.h"
-#include "proto/convert.h"
+#include "core/model/camera.h"
+#include "core/model/camera_model.h"
 
 namespace selfcal::client {
 namespace {
@@ -17,51 +18,99 @@ constexpr double kPrincipalTolerance = 0.02;  // of the width
 constexpr double kRotationTolerance_rad = 0.05;
 constexpr double kPositionTolerance_m = 0.05;
 constexpr double kOffsetTolerance_s = 0.05;
+// Of what is not stated.
+// The scale in the middle of the image [1/rad], times its width: lenses of 64
+// and of 160 degrees.
+constexpr double kGuessedFocal = 0.8;
+constexpr double kGuessedWideFocal = 0.36;
+constexpr double kGuessedFocalTolerance = 0.3;
+constexpr double kGuessedPosition_m = 0.1;
 // Of a tracked point, with what is systematic in it.
 constexpr double kPixelSigma_px = 0.5;
 
-absl::StatusOr<Rig> StatedBy(const Recording& recording,
-                             const std::vector<std::string>& extrinsics,
-                             std::vector<Loss>* losses) {
-  Rig rig;
-  for (const RecordedCamera& camera : recording.cameras()) {
-    if (!camera.calibration) {
-      return absl::InvalidArgumentError(fmt::format(
-          "the recording does not state the calibration of {}: begin with that "
-          "of a tool, --from TOOL FILE...",
-          camera.name));
+bool IsPinhole(DistortionModel model) {
+  return DistortionName(model).starts_with("radial-tangential");
+}
+
+// A camera of which only the images are known.
+absl::StatusOr<CameraCalibration> Guess(Recording* recording,
+                                        int camera,
+                                        DistortionModel model) {
+  const auto pixels = recording->ReadImage(camera, 0);
+  if (!pixels.ok()) return pixels.status();
+  CameraCalibration guess;
+  guess.model = model;
+  guess.distortion.setZero(DistortionSize(model));
+  if (!IsPinhole(model)) {
+    for (int i = 0; i < guess.distortion.size(); ++i) {
+      const Interval usual = ModelInfo(model).coefficients[i].usual;
+      guess.distortion[i] = (usual.low + usual.high) / 2;
     }
-    rig.factory.cameras.push_back(*camera.calibration);
   }
-  const absl::Status posed = SetExtrinsics(extrinsics, &rig, losses);
-  if (!posed.ok()) return posed;
-  for (std::size_t j = 0; j < recording.cameras().size(); ++j) {
+  guess.width_px = pixels->width_px;
+  guess.height_px = pixels->height_px;
+  guess.c = Eigen::Vector2d(guess.width_px - 1, guess.height_px - 1) / 2;
+  guess.f.setOnes();
+  const double px_per_rad =
+      guess.width_px * (IsPinhole(model) ? kGuessedFocal : kGuessedWideFocal);
+  guess.f = px_per_rad / PixelsPerRadian(guess).array();
+  return guess;
+}
+
+struct Stated {
+  Rig rig;
+  std::vector<UnknownOfCamera> unknown;
+};
+
+absl::StatusOr<Stated> StatedBy(Recording* recording,
+                                const std::vector<std::string>& extrinsics,
+                                DistortionModel guessed,
+                                std::vector<Loss>* losses) {
+  Stated stated;
+  for (std::size_t j = 0; j < recording->cameras().size(); ++j) {
+    const RecordedCamera& camera = recording->cameras()[j];
     const bool given = std::any_of(
         extrinsics.begin(), extrinsics.end(), [&](const std::string& text) {
           return text.starts_with(fmt::format("cam{}=", j));
         });
-    if (!given && !recording.cameras()[j].has_pose) {
-      return absl::InvalidArgumentError(fmt::format(
-          "the recording does not state the pose of cam{}: give it with "
-          "--extrinsics, to 10 degrees and 10 cm",
-          j));
+    UnknownOfCamera unknown{.rotation = !given && !camera.has_pose};
+    absl::StatusOr<CameraCalibration> theta = CameraCalibration();
+    if (camera.calibration) {
+      theta = *camera.calibration;
+    } else {
+      unknown.focal = true;
+      theta = Guess(recording, static_cast<int>(j), guessed);
     }
+    if (!theta.ok()) return theta.status();
+    stated.rig.factory.cameras.push_back(*theta);
+    stated.unknown.push_back(unknown);
   }
-  return rig;
+  const absl::Status posed = SetExtrinsics(extrinsics, &stated.rig, losses);
+  if (!posed.ok()) return posed;
+  return stated;
 }
 
 // What precedes the settings of the user, which take precedence.
-void AddTolerances(const v1::Rig& rig, RigInput* input) {
+void AddTolerances(const v1::Rig& rig,
+                   const std::vector<UnknownOfCamera>& unknown,
+                   RigInput* input) {
   std::vector<std::string> sigmas;
   for (int j = 0; j < rig.factory().cameras_size(); ++j) {
     const auto& camera = rig.factory().cameras(j);
     const std::string name = fmt::format("cam{}", j);
     const double f_px = (camera.f().x() + camera.f().y()) / 2;
-    sigmas.push_back(fmt::format("{}.focal={}", name, kFocalTolerance * f_px));
+    const UnknownOfCamera& of_camera = unknown[static_cast<std::size_t>(j)];
+    sigmas.push_back(fmt::format(
+        "{}.focal={}",
+        name,
+        f_px * (of_camera.focal ? kGuessedFocalTolerance : kFocalTolerance)));
     sigmas.push_back(fmt::format(
         "{}.principal={}", name, kPrincipalTolerance * camera.width_px()));
     sigmas.push_back(fmt::format("{}.q_CI={}", name, kRotationTolerance_rad));
-    sigmas.push_back(fmt::format("{}.p_CI={}", name, kPositionTolerance_m));
+    sigmas.push_back(fmt::format(
+        "{}.p_CI={}",
+        name,
+        of_camera.rotation ? kGuessedPosition_m : kPositionTolerance_m));
     sigmas.push_back(
         fmt::format("{}.time_offset={}", name, kOffsetTolerance_s));
   }
@@ -86,23 +135,33 @@ double ImuRate(const Recording& recording) {
   return 1e9 / static_cast<double>(*middle);
 }
 
-absl::StatusOr<v1::Rig> ReadRecordedRig(RigInput input,
-                                        const std::vector<std::string>& from,
-                                        const Recording& recording,
-                                        std::vector<Loss>* losses) {
+absl::StatusOr<RecordedRig> ReadRecordedRig(
+    RigInput input,
+    const std::vector<std::string>& from,
+    DistortionModel guessed,
+    Recording* recording,
+    std::vector<Loss>* losses) {
+  RecordedRig result;
   if (from.empty()) {
-    auto stated = StatedBy(recording, input.extrinsics, losses);
+    auto stated = StatedBy(recording, input.extrinsics, guessed, losses);
     if (!stated.ok()) return stated.status();
-    input.base = *std::move(stated);
+    input.base = std::move(stated->rig);
+    result.unknown = std::move(stated->unknown);
   } else {
     input.from = from.front();
     input.files.assign(from.begin() + 1, from.end());
   }
-  const auto plain = ReadRig(input, losses);
-  if (!plain.ok()) return plain;
+  // The tolerances depend on what is read.
+  auto rig = ReadRig(input, losses);
+  if (!rig.ok()) return rig.status();
+  result.unknown.resize(
+      static_cast<std::size_t>(rig->factory().cameras_size()));
+  AddTolerances(*rig, result.unknown, &input);
   losses->clear();
-  AddTolerances(*plain, &input);
-  return ReadRig(input, losses);
+  rig = ReadRig(input, losses);
+  if (!rig.ok()) return rig.status();
+  result.rig = *std::move(rig);
+  return result;
 }
 
 }  // namespace selfcal::client

@@ -2,22 +2,96 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
 #include <utility>
-#include <vector>
 
 #include "client/odometry/odometry.h"
+#include "client/tracking/feature_tracker.h"
 #include "core/calibration/calibrate.h"
 #include "core/calibration/theta_prior.h"
+#include "core/initialisation/rotation_start.h"
 
 namespace selfcal::client {
 namespace {
 
 constexpr int kSegments = 10;
+constexpr double kSeconds = 20;
+// An offset that differs by less from the given one is found later, and better.
+constexpr double kLeastOffset_s = 5e-3;
+constexpr double kOffsetSigmas = 3;
+
+// Tracks of one camera, followed by its images alone: the gyroscope does not
+// help before it is known where the camera looks.
+absl::StatusOr<std::vector<TrackedImage>> TracksOf(
+    Recording* recording, const CameraCalibration& theta, int camera) {
+  Calibration alone;
+  alone.cameras = {theta};
+  FeatureTracker tracker(alone, {});
+  std::vector<TrackedImage> images;
+  const std::vector<std::int64_t>& times_ns =
+      recording->cameras()[camera].image_times_ns;
+  for (std::size_t i = 0; i < times_ns.size(); ++i) {
+    if (1e-9 * static_cast<double>(times_ns[i] - times_ns[0]) > kSeconds) break;
+    auto pixels = recording->ReadImage(camera, static_cast<int>(i));
+    if (!pixels.ok()) continue;
+    const cv::Mat image(
+        pixels->height_px, pixels->width_px, CV_8UC1, pixels->pixels.data());
+    TrackedImage tracked;
+    tracked.t_ns = times_ns[i];
+    for (const TrackPoint& point : tracker.Track(times_ns[i], {image})) {
+      tracked.points.push_back({point.landmark, point.z_px});
+    }
+    images.push_back(std::move(tracked));
+  }
+  return images;
+}
+
+// Moves a camera to where its rotations agree with those of the gyroscope.
+absl::Status Turn(Recording* recording,
+                  const UnknownOfCamera& unknown,
+                  int camera,
+                  Calibration* theta) {
+  CameraCalibration& moved = theta->cameras[camera];
+  const auto images = TracksOf(recording, moved, camera);
+  if (!images.ok()) return images.status();
+  const RotationStartResult found =
+      FindRotationStart(moved,
+                        theta->imu,
+                        *images,
+                        recording->imu(),
+                        {.search_rotation = unknown.rotation,
+                         .estimate_focal_scale = unknown.focal});
+  if (!found.start) {
+    if (!unknown.rotation && !unknown.focal) return absl::OkStatus();
+    return absl::NotFoundError(
+        fmt::format("{}: {}", recording->cameras()[camera].name, found.reason));
+  }
+  const RotationStart& start = *found.start;
+  if (unknown.rotation) moved.q_CI = start.q_CI;
+  if (unknown.focal) moved.f *= start.focal_scale;
+  const double change_s = std::abs(start.time_offset_s - moved.time_offset_s);
+  if (change_s >
+      std::max(kLeastOffset_s, kOffsetSigmas * start.Sigma(kStartTimeOffset))) {
+    moved.time_offset_s = start.time_offset_s;
+  }
+  return absl::OkStatus();
+}
 
 }  // namespace
 
-absl::StatusOr<CalibrationStart> FindStart(Recording* recording,
-                                           const Rig& rig) {
+absl::StatusOr<CalibrationStart> FindStart(
+    Recording* recording,
+    const Rig& given,
+    const std::vector<UnknownOfCamera>& unknown) {
+  Rig rig = given;
+  for (std::size_t j = 0; j < unknown.size(); ++j) {
+    const absl::Status turned =
+        Turn(recording, unknown[j], static_cast<int>(j), &rig.factory);
+    if (!turned.ok()) return turned;
+  }
   Odometry odometry(recording, rig, rig.factory, {.session = "start"});
   std::vector<MotionSegment> segments;
   std::string failure = "the recording is too short";

@@ -4,7 +4,7 @@
 
 #include <absl/status/statusor.h>
 
-#include <string>
+#include <vector>
 
 #include "client/recording/recording.h"
 #include "core/model/calibration.h"
@@ -12,13 +12,21 @@
 
 namespace selfcal::client {
 
+// What is unknown of a camera, beyond the tolerances of a rig.
+struct UnknownOfCamera {
+  bool rotation = false;  // q_CI may be any
+  bool focal = false;     // f is a guess from the size of the image
+};
+
 struct CalibrationStart {
   Calibration theta;
   int segments = 0;  // on which it is based
 };
 
-// Estimates the motion of the first 40 s of a recording with the factory
-// calibration, and calibrates on it: with that start, motions are right to
+// Compares the rotations of each camera with those of the gyroscope over the
+// first 20 s of a recording (core/initialisation): for the time offset and, as
+// far as `unknown` says so, its rotation and focal length. Then estimates the
+// motion of the first 40 s, and calibrates on it: with that start, motions are right to
 // millimetres instead of decimetres, and tracks to a fraction of a pixel
 // instead of several, which what looks for mistakes in the data takes for
 // granted. Directions of theta that these segments do not show keep their
@@ -29,9 +37,12 @@ struct CalibrationStart {
 // about which the data says as much as the prior, and by nothing that matters
 // in all others.
 //
-// NOT_FOUND with the reason if there is no motion or the calibration does not
+// `unknown` has an entry for each camera. NOT_FOUND with the reason if there is
+// no motion, the rotation of a camera is not found or the calibration does not
 // converge, and the errors of Odometry.
-absl::StatusOr<CalibrationStart> FindStart(Recording* recording,
-                                           const Rig& rig);
+absl::StatusOr<CalibrationStart> FindStart(
+    Recording* recording,
+    const Rig& rig,
+    const std::vector<UnknownOfCamera>& unknown);
 
 }  // namespace selfcal::client

@@ -232,11 +232,6 @@ class Broken(unittest.TestCase):
         sensor.write_text(sensor.read_text().replace("480", "400"))
         self.expect(small, "640 x 480")
 
-    def test_no_calibration(self) -> None:
-        bare = render(self.folder / "bare", "--seconds", "2")
-        (bare / "mav0/cam0/sensor.yaml").unlink()
-        self.expect(bare, "does not state the calibration of cam0")
-
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])
