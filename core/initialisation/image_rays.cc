@@ -65,8 +65,12 @@ RayImages::RayImages(const CameraCalibration& camera,
     }
     std::ranges::stable_sort(rays.points, {}, &ImagePoint::landmark);
     const auto repeated =
-        std::ranges::unique(rays.points, {}, &ImagePoint::landmark);
-    rays.points.erase(repeated.begin(), repeated.end());
+        std::unique(rays.points.begin(),
+                    rays.points.end(),
+                    [](const ImagePoint& a, const ImagePoint& b) {
+                      return a.landmark == b.landmark;
+                    });
+    rays.points.erase(repeated, rays.points.end());
     images_.push_back(std::move(rays));
   }
   SetFocalScale(1);

@@ -17,7 +17,8 @@ std::vector<TrackedImage> MovingPoints(int images, double step_px) {
   for (int k = 0; k < images; ++k) {
     TrackedImage image{1'000 + k * 50'000'000ll, {}};
     for (int i = 0; i < 40; ++i) {
-      const auto landmark = static_cast<std::uint64_t>(k + i);
+      const std::uint64_t landmark =
+          static_cast<std::uint64_t>(k) + static_cast<std::uint64_t>(i);
       image.points.push_back(
           {landmark,
            {200 + 3 * static_cast<double>(landmark % 7) + step_px * k,
