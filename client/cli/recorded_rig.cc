@@ -40,7 +40,7 @@ absl::StatusOr<CameraCalibration> Guess(Recording* recording,
   if (!pixels.ok()) return pixels.status();
   CameraCalibration guess;
   guess.model = model;
-  guess.distortion.setZero(DistortionSize(model));
+  guess.distortion = Undistorted(model);
   if (!IsPinhole(model)) {
     for (int i = 0; i < guess.distortion.size(); ++i) {
       const Interval usual = ModelInfo(model).coefficients[i].usual;

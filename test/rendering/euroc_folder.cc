@@ -181,6 +181,7 @@ void WriteImage(const GreyImage& image, const fs::path& path) {
 }  // namespace
 
 void WriteEurocFolder(const RenderedRecording& recording,
+                      const Calibration& stated,
                       const fs::path& folder,
                       const std::function<void(int)>& written) {
   const fs::path mav = folder / "mav0";
@@ -191,10 +192,9 @@ void WriteEurocFolder(const RenderedRecording& recording,
   for (int j = 0; j < recording.cameras(); ++j) {
     const fs::path camera = mav / fmt::format("cam{}", j);
     fs::create_directories(camera / "data");
-    WriteText(
-        camera / "sensor.yaml",
-        CameraYaml(recording.rig().factory.cameras[static_cast<std::size_t>(j)],
-                   recording.options()));
+    WriteText(camera / "sensor.yaml",
+              CameraYaml(stated.cameras[static_cast<std::size_t>(j)],
+                         recording.options()));
     std::string csv = "#timestamp [ns],filename\n";
     for (int k = 0; k < recording.images(); ++k) {
       const std::int64_t stamp_ns = kEurocEpoch_ns + recording.stamp_ns(k);

@@ -21,10 +21,12 @@ namespace selfcal {
 // Stamps of the files are those of the recording plus this.
 inline constexpr std::int64_t kEurocEpoch_ns = 1'400'000'000'000'000'000;
 
+// Each sensor.yaml has what `stated` says, the truth or another start.
 // `written` is called after each image with their number so far. Throws
 // std::runtime_error with the path of a file that cannot be written. Files that
 // exist are replaced.
 void WriteEurocFolder(const RenderedRecording& recording,
+                      const Calibration& stated,
                       const std::filesystem::path& folder,
                       const std::function<void(int)>& written = {});
 

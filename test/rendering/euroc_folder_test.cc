@@ -46,7 +46,7 @@ class EurocFolder : public testing::Test {
     folder_ = std::make_unique<TempFolder>(FolderInMemory());
     recording_ = std::make_unique<RenderedRecording>(
         rig, MakeHandheld(0.3, 1, 1), options);
-    WriteEurocFolder(*recording_, folder_->path());
+    WriteEurocFolder(*recording_, recording_->rig().factory, folder_->path());
   }
   static void TearDownTestSuite() {
     folder_.reset();
@@ -161,7 +161,7 @@ TEST(EurocFolderErrors, NamesTheFileThatCannotBeWritten) {
   const RenderedRecording recording(
       HandheldRig("x"), MakeHandheld(0.2, 1, 1), {});
   try {
-    WriteEurocFolder(recording, folder.path());
+    WriteEurocFolder(recording, recording.rig().factory, folder.path());
     FAIL() << "it was written";
   } catch (const std::exception& e) {
     EXPECT_NE(std::string(e.what()).find("mav0"), std::string::npos);

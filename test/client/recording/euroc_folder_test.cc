@@ -57,7 +57,7 @@ class EurocReader : public testing::Test {
   static void SetUpTestSuite() {
     whole_ = new TempFolder(FolderInMemory());
     rendered_ = new RenderedRecording(StereoRig(), MakeHandheld(0.4, 1, 1), {});
-    WriteEurocFolder(*rendered_, whole_->path());
+    WriteEurocFolder(*rendered_, rendered_->rig().factory, whole_->path());
   }
   static void TearDownTestSuite() {
     delete rendered_;

@@ -6,6 +6,7 @@
 #include "core/model/so3.h"
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
+#include "test/core/simulation/rigs.h"
 
 namespace selfcal {
 namespace {
@@ -33,19 +34,6 @@ Rig StereoPairRig() {
   right.c = {316, 243};
   rig.factory.cameras = {left, right};
   return rig;
-}
-
-Calibration WrongStart(const Calibration& truth) {
-  CalibrationError error;
-  error.focal_relative = 0.05;
-  error.principal_point_px = 10;
-  error.camera_rotation_rad = 0.0524;
-  error.camera_position_m = 0.05;
-  Calibration start = PerturbCalibration(truth, error, 1);
-  for (CameraCalibration& camera : start.cameras) {
-    camera.time_offset_s += 0.02;
-  }
-  return start;
 }
 
 std::vector<RecordingKind> RecordingKinds() {

@@ -27,10 +27,6 @@ struct RecordingKind {
 // those of EuRoC.
 Rig StereoPairRig();
 
-// The calibration of a start that is wrong by 5 % in f, 10 px in c, 3 degrees,
-// 5 cm and 20 ms.
-Calibration WrongStart(const Calibration& truth);
-
 std::vector<RecordingKind> RecordingKinds();
 
 RecordingKind KindNamed(const std::string& name);

@@ -95,6 +95,21 @@ inline Rig LensRig(DistortionModel model) {
   return rig;
 }
 
+// The calibration of a start that is wrong by 5 % in f, 10 px in c, 3 degrees,
+// 5 cm and 20 ms.
+inline Calibration WrongStart(const Calibration& truth) {
+  CalibrationError error;
+  error.focal_relative = 0.05;
+  error.principal_point_px = 10;
+  error.camera_rotation_rad = 0.0524;
+  error.camera_position_m = 0.05;
+  Calibration start = PerturbCalibration(truth, error, 1);
+  for (CameraCalibration& camera : start.cameras) {
+    camera.time_offset_s += 0.02;
+  }
+  return start;
+}
+
 // Errors of the SLAM system all zero.
 inline SimulationOptions PerfectSlam() {
   SimulationOptions options;
