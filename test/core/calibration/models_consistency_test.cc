@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "core/model/image_bounds.h"
 #include "core/simulation/simulate.h"
 #include "test/core/calibration/simulated_errors.h"
 #include "test/core/model/each_model.h"
@@ -32,6 +33,25 @@ TEST_P(EachModel, IsFoundWithinItsSigmas) {
     return CalibrateSimulated(
         rig, truth, seed, {80, UndeterminedDirections(GetParam())});
   });
+}
+
+// Each step of theta moves the end of the rays, and those of observations near
+// it out of the model and back.
+TEST(EndOfRays, WithinTheImageDoesNotKeepALensFromBeingFound) {
+  int lenses = 0;
+  for (const DistortionModel model : DistortionModels()) {
+    Rig rig = LensRig(model);
+    rig.factory.cameras[0].f *= 0.85;
+    if (CoversImage(rig.factory.cameras[0], 0)) continue;
+    SCOPED_TRACE(DistortionName(model));
+    ++lenses;
+    const Calibration truth = rig.factory;
+    ExpectConsistent(4, [&](std::uint64_t seed) {
+      rig.factory = PerturbCalibration(truth, {}, seed);
+      return CalibrateSimulated(rig, truth, seed, {80});
+    });
+  }
+  EXPECT_EQ(lenses, 2);
 }
 
 }  // namespace
