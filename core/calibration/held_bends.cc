@@ -51,7 +51,7 @@ class Bends {
   std::optional<Eigen::VectorXd> AlongOne(const Eigen::VectorXd& here,
                                           const Eigen::VectorXd& step,
                                           double information) const {
-    // Of h, by the data and the prior.
+    // The data and the prior say this about h.
     const double variance = 1 / (1 + information);
     const double mean = variance * linearised_.by_offset.eta.dot(step);
     const double sigma = std::sqrt(variance);
