@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/calibration/descent.h"
+#include "core/calibration/held_bends.h"
 #include "core/calibration/noise_weighting.h"
 #include "core/calibration/partition.h"
 #include "core/calibration/problem.h"
@@ -106,7 +107,7 @@ void TestSegments(const std::vector<const MotionSegment*>& segments,
   result.covariance *= excess;
   run->estimate = {.reference = point.reference(),
                    .d = point.estimate().d,
-                   .subspace = point.subspace(),
+                   .subspace = std::move(run->estimate.subspace),
                    .Lambda = point.information().Lambda,
                    .excess = excess,
                    .noise_scale = LargestNoise(result.noise_scales,
@@ -117,8 +118,10 @@ void TestSegments(const std::vector<const MotionSegment*>& segments,
   }
 }
 
-void ReportEstimate(WorkingPoint* point, CalibrationResult* result) {
-  const ThetaSubspace& subspace = point->subspace();
+void ReportEstimate(WorkingPoint* point, CalibrationRun* run) {
+  CalibrationResult* result = &run->result;
+  ThetaSubspace& subspace = run->estimate.subspace = point->subspace();
+  subspace.bends = BendsOfHeld(*point);
   result->theta = point->theta();
   const Eigen::MatrixXd by_offset =
       ThetaByOffset(point->reference(), point->estimate().d);
@@ -181,7 +184,7 @@ CalibrationRun RunCalibration(const Rig& rig,
   }
   result.noise_scales = noise.ScalesOfStated();
   result.message = MessageOf(state);
-  ReportEstimate(&point, &result);
+  ReportEstimate(&point, &run);
   TestSegments(segments, point, &run);
   ReportUse(point, &result);
   return run;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/model/image_bounds.h"
 #include "core/model/median.h"
 
 namespace selfcal {
@@ -22,20 +23,38 @@ struct Selected {
   int candidates = 0;  // all but those at the border
 };
 
-// Weight of an observation by its predicted position.
-double BorderWeight(const CameraCalibration& camera,
-                    const Eigen::Vector2d& z_px,
-                    double pixel_sigma_px) {
-  const Eigen::Array2d last_px(camera.width_px - 1, camera.height_px - 1);
-  const double distance_px =
-      z_px.array().min(last_px - z_px.array()).minCoeff();
-  return std::clamp((distance_px / pixel_sigma_px - kBorderBegin) /
-                        (kBorderEnd - kBorderBegin),
-                    0.0,
-                    1.0);
-}
+// Weights of observations by their predicted positions.
+class BorderWeights {
+ public:
+  BorderWeights(const Calibration& theta, double pixel_sigma_px)
+      : theta_(theta), sigma_px_(pixel_sigma_px) {
+    for (const CameraCalibration& camera : theta.cameras) {
+      rays_end_within_.push_back(!CoversImage(camera, kBorderEnd * sigma_px_));
+    }
+  }
+
+  double At(int camera, const Eigen::Vector2d& z_px) const {
+    const CameraCalibration& of = theta_.cameras[camera];
+    const Eigen::Array2d last_px(of.width_px - 1, of.height_px - 1);
+    double distance_px = z_px.array().min(last_px - z_px.array()).minCoeff();
+    if (rays_end_within_[camera]) {
+      distance_px = std::min(
+          distance_px, DistanceToLastRay(of, z_px, kBorderEnd * sigma_px_));
+    }
+    return std::clamp(
+        (distance_px / sigma_px_ - kBorderBegin) / (kBorderEnd - kBorderBegin),
+        0.0,
+        1.0);
+  }
+
+ private:
+  const Calibration& theta_;
+  double sigma_px_;
+  std::vector<bool> rays_end_within_;  // within the image of a camera
+};
 
 Selected Select(const LandmarkScene& scene,
+                const BorderWeights& borders,
                 const Track& track,
                 const LandmarkPosition& position,
                 double gate_px) {
@@ -49,8 +68,7 @@ Selected Select(const LandmarkScene& scene,
       ++result.candidates;
       continue;
     }
-    const double weight = BorderWeight(
-        scene.camera(seen), seen.z_px + residual_px, scene.pixel_sigma_px());
+    const double weight = borders.At(seen.camera, seen.z_px + residual_px);
     if (weight > 0) {
       ++result.candidates;
       result.used.push_back({i, weight});
@@ -140,12 +158,14 @@ SettledPosition SettlePosition(const LandmarkScene& scene,
 // Decides whether a landmark is used, and which of its observations; nullopt if
 // it is dropped.
 std::optional<ScreenedLandmark> AssessLandmark(const LandmarkScene& scene,
+                                               const BorderWeights& borders,
                                                const Track& track,
                                                const Thresholds& thresholds,
                                                const SettledPosition& settled) {
   const double sigma = InverseDepthSigma(settled.refined.information);
   const double weight = 2 * (1 - sigma / thresholds.max_inverse_depth_sigma);
   Selected selected = Select(scene,
+                             borders,
                              track,
                              settled.position,
                              thresholds.loss.gate * scene.pixel_sigma_px());
@@ -157,6 +177,7 @@ std::optional<ScreenedLandmark> AssessLandmark(const LandmarkScene& scene,
 }
 
 Screening Screen(const LandmarkScene& scene,
+                 const BorderWeights& borders,
                  const CalibrationProblem& problem,
                  const CalibrateOptions& options,
                  const std::vector<TrackPositions>& positions) {
@@ -177,7 +198,7 @@ Screening Screen(const LandmarkScene& scene,
             SettlePosition(scene, track, thresholds.loss, *positions[t].other);
         if (other.refined.cost < settled.refined.cost) settled = other;
       }
-      landmark = AssessLandmark(scene, track, thresholds, settled);
+      landmark = AssessLandmark(scene, borders, track, thresholds, settled);
     }
     if (!landmark) {
       ++result.landmarks_dropped;
@@ -273,7 +294,11 @@ Screening ScreenLandmarks(const Rig& rig,
       positions[t].found = TriangulateTrack(scene, track);
     }
   }
-  Screening result = Screen(scene, problem, options, positions);
+  Screening result = Screen(scene,
+                            BorderWeights(theta, rig.pixel_sigma_px),
+                            problem,
+                            options,
+                            positions);
   result.screenings = screenings;
   if (before != nullptr) {
     SetTrackNoise(before->track_noise_factor, &result);

@@ -31,7 +31,9 @@ inline constexpr double kOutlierGate = 5.0;
 // near the border its own noise decides whether it is observed, so that the
 // observed ones are biased inwards, and with them focal length and distortion.
 // The weight depends on the prediction, since it is not correlated with the
-// residuals.
+// residuals. The rays of a camera may end within its image, at the largest
+// radius: d sigmas before that end, a ray is only 2 d of its own sigmas away
+// from the last one, and a step of theta takes it out of the model and back.
 inline constexpr double kBorderBegin = 2.0;
 inline constexpr double kBorderEnd = 4.0;
 // A landmark with a larger fraction of outliers is dropped.

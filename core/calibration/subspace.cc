@@ -161,6 +161,19 @@ Eigen::MatrixXd SubspaceCovariance(const Rig& rig,
   return (covariance + covariance.transpose()) / 2;
 }
 
+Eigen::MatrixXd HeldSteps(const Rig& rig,
+                          const ThetaSubspace& subspace,
+                          const Eigen::MatrixXd& Lambda) {
+  const Eigen::MatrixXd held = FreeSigmas(rig).asDiagonal() * subspace.held;
+  if (subspace.held.cols() == 0 || subspace.estimated.cols() == 0) return held;
+  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
+  const Eigen::MatrixXd leaning =
+      basis * Reduced(rig, subspace, Lambda)
+                  .ldlt()
+                  .solve(basis.transpose() * (Lambda * held));
+  return held - leaning;
+}
+
 Eigen::MatrixXd CovarianceWithHeld(const Rig& rig,
                                    const ThetaSubspace& subspace,
                                    const Eigen::MatrixXd& Lambda) {
@@ -168,14 +181,12 @@ Eigen::MatrixXd CovarianceWithHeld(const Rig& rig,
   if (subspace.held.cols() == 0 || subspace.estimated.cols() == 0) {
     return covariance;
   }
-  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
   const Eigen::MatrixXd held = FreeSigmas(rig).asDiagonal() * subspace.held;
-  const Eigen::MatrixXd leaning =
-      basis * Reduced(rig, subspace, Lambda)
-                  .ldlt()
-                  .solve(basis.transpose() * (Lambda * held));
-  const Eigen::MatrixXd off = held - leaning;
+  const Eigen::MatrixXd off = HeldSteps(rig, subspace, Lambda);
   covariance += off * off.transpose() - held * held.transpose();
+  if (subspace.bends.cols() > 0) {
+    covariance += subspace.bends * subspace.bends.transpose();
+  }
   return (covariance + covariance.transpose()) / 2;
 }
 

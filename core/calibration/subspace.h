@@ -18,6 +18,9 @@ struct ThetaSubspace {
   Eigen::MatrixXd estimated;                    // D x r
   Eigen::MatrixXd held;                         // D x h
   std::vector<UnobservedDirection> unobserved;  // h of them
+  // Root mean squares of what errors along held directions do to the others
+  // beyond the first order, D x k, in units of the tangent (held_bends.h).
+  Eigen::MatrixXd bends = {};
 };
 
 // All free directions are estimated.
@@ -61,9 +64,16 @@ Eigen::MatrixXd SubspaceCovariance(const Rig& rig,
                                    const ThetaSubspace& subspace,
                                    const Eigen::MatrixXd& Lambda);
 
-// The same for a final estimate. Held directions have the error of the prior,
-// which affects the estimated ones where Lambda couples the two: that effect is
-// added (as in the Schmidt-Kalman filter for states that are not estimated).
+// Steps (tangent units) of one sigma of the prior along the held directions,
+// with the estimated ones at their minimum by Lambda; D x h.
+Eigen::MatrixXd HeldSteps(const Rig& rig,
+                          const ThetaSubspace& subspace,
+                          const Eigen::MatrixXd& Lambda);
+
+// The covariance of a final estimate. Held directions have the error of the
+// prior, which affects the estimated ones where Lambda couples the two: that
+// effect is added (as in the Schmidt-Kalman filter for states that are not
+// estimated), and so are the bends.
 Eigen::MatrixXd CovarianceWithHeld(const Rig& rig,
                                    const ThetaSubspace& subspace,
                                    const Eigen::MatrixXd& Lambda);

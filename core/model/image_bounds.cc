@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/model/camera.h"
+
 namespace selfcal {
 namespace {
 
@@ -26,6 +28,36 @@ bool IsInImage(const CameraCalibration& camera,
   return z_px.x() >= -margin_px && z_px.y() >= -margin_px &&
          z_px.x() <= camera.width_px + margin_px &&
          z_px.y() <= camera.height_px + margin_px;
+}
+
+bool CoversImage(const CameraCalibration& camera, double margin_px) {
+  const double x_px[] = {-margin_px, camera.width_px + margin_px};
+  const double y_px[] = {-margin_px, camera.height_px + margin_px};
+  Eigen::Vector3d bearing_C;
+  for (const double x : x_px) {
+    for (const double y : y_px) {
+      if (!Unproject(camera, {x, y}, &bearing_C)) return false;
+    }
+  }
+  return true;
+}
+
+double DistanceToLastRay(const CameraCalibration& camera,
+                         const Eigen::Vector2d& z_px,
+                         double reach_px) {
+  constexpr int kHalvings = 10;
+  const Eigen::Vector2d outwards = (z_px - camera.c).normalized();
+  Eigen::Vector3d bearing_C;
+  const auto has_ray = [&](double distance_px) {
+    return Unproject(camera, z_px + distance_px * outwards, &bearing_C);
+  };
+  if (has_ray(reach_px)) return reach_px;
+  double inside_px = 0, beyond_px = reach_px;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle_px = (inside_px + beyond_px) / 2;
+    (has_ray(middle_px) ? inside_px : beyond_px) = middle_px;
+  }
+  return inside_px;
 }
 
 std::size_t CountStrayObservations(const MotionSegment& segment,

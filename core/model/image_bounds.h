@@ -1,5 +1,5 @@
-// The borders of a camera's image, and what to do with the few observations
-// beyond them that a tracker reports.
+// The borders of a camera's image and of its rays, and what to do with the few
+// observations beyond the former that a tracker reports.
 //
 // Pure functions, callable from any thread.
 #pragma once
@@ -16,6 +16,19 @@ namespace selfcal {
 bool IsInImage(const CameraCalibration& camera,
                const Eigen::Vector2d& z_px,
                double margin_px);
+
+// The rays of a camera may end within its image, where the model is no longer
+// one-to-one: pixels further from the principal point have no ray. Those that
+// have one are star-shaped about the principal point.
+
+// True if every pixel of the image, and up to the margin outside, has a ray.
+bool CoversImage(const CameraCalibration& camera, double margin_px);
+
+// Distance [px] from a pixel that has a ray to the last one that has, away from
+// the principal point; at most `reach_px`, and accurate to 1/1000 of it.
+double DistanceToLastRay(const CameraCalibration& camera,
+                         const Eigen::Vector2d& z_px,
+                         double reach_px);
 
 // A larger part of the observations of a segment outside the image is not due
 // to a tracker: it stems from another camera, or from another resolution.

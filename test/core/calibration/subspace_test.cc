@@ -98,8 +98,8 @@ TEST(Subspace, HoldsTheGivenDirectionsAndThoseWithLessInformation) {
   }
 }
 
-// Estimated directions are affected by held ones: over many draws, the errors
-// of both have the claimed covariance.
+// Estimated directions are affected by held ones, also beyond the first order:
+// over many draws, the errors of all have the claimed covariance.
 TEST(Subspace, CovarianceIsThatOfTheErrors) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
@@ -108,12 +108,14 @@ TEST(Subspace, CovarianceIsThatOfTheErrors) {
   const Eigen::MatrixXd Lambda =
       InTangentUnits(rig, RandomInformation(rig, &random));
   // Directions that are not eigenvectors of Lambda.
-  const ThetaSubspace subspace = HoldDirections(
+  ThetaSubspace subspace = HoldDirections(
       rig,
       Lambda,
       ObservedSubspace(
           rig, InTangentUnits(rig, RandomInformation(rig, &random)), 4)
           .held);
+  subspace.bends =
+      PriorSigmas(rig).asDiagonal() * subspace.estimated.leftCols<2>();
   const Eigen::MatrixXd claimed = CovarianceWithHeld(rig, subspace, Lambda);
   const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
   const Eigen::MatrixXd reduced = basis.transpose() * Lambda * basis;
@@ -124,15 +126,18 @@ TEST(Subspace, CovarianceIsThatOfTheErrors) {
   for (int i = 0; i < kRuns; ++i) {
     // Errors of held directions, and of the data: eta = Lambda truth + noise.
     Eigen::VectorXd off(subspace.held.cols()), noise(free.size());
+    Eigen::Vector2d bent;
     for (double& value : off) value = normal(random);
+    for (double& value : bent) value = normal(random);
     for (double& value : noise) value = normal(random);
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(Lambda.rows());
     gradient(free) = root * noise;
     const Eigen::VectorXd held =
         PriorSigmas(rig).asDiagonal() * subspace.held * off;
     const Eigen::VectorXd error =
-        held + basis * reduced.ldlt().solve(basis.transpose() *
-                                            (gradient - Lambda * held));
+        held + subspace.bends * bent +
+        basis * reduced.ldlt().solve(basis.transpose() *
+                                     (gradient - Lambda * held));
     sum += error(free).dot(Eigen::MatrixXd(claimed(free, free))
                                .ldlt()
                                .solve(Eigen::VectorXd(error(free))));
