@@ -88,7 +88,9 @@ set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA
 selfcal_package(cli selfcal science
   "command line of selfcald"
   "Creates rigs, imports recordings, shows segments, tables, runs and versions of
-calibrations, writes them in the formats of other tools, and makes backups.")
+calibrations, writes them in the formats of other tools, and makes backups.
+Calibrates from recordings of images and readings, for which it needs selfcald.")
+set(CPACK_DEBIAN_CLI_PACKAGE_RECOMMENDS selfcald)
 selfcal_package(library ${library} libs
   "client library of selfcald"
   "Streams motion segments from a SLAM process to the daemon without blocking it,
