@@ -175,9 +175,12 @@ bool FeatureTracker::TransferWarp(const Camera& from,
 }
 
 bool FeatureTracker::Align(const cv::Mat& smooth,
+                           const CameraCalibration& camera,
                            PatchWarp warp,
                            Point* point) const {
-  if (point->patch->Align(smooth, &warp) < options_.min_correlation) {
+  const LensCurvature curvature = CurvatureAt(camera, warp.z_px);
+  if (point->patch->Align(smooth, curvature, &warp) <
+      options_.min_correlation) {
     return false;
   }
   point->A = warp.A;
@@ -185,7 +188,8 @@ bool FeatureTracker::Align(const cv::Mat& smooth,
   const Eigen::Vector2d stretch = warp.A.jacobiSvd().singularValues();
   if ((stretch[0] > kMaxStretch || stretch[1] < 1 / kMaxStretch) &&
       IsInside(smooth, point->z_px, kPatchBorder_px)) {
-    point->patch = std::make_shared<PatchTemplate>(smooth, warp.z_px);
+    point->patch = std::make_shared<PatchTemplate>(
+        smooth, warp.z_px, CurvatureAt(camera, warp.z_px));
     point->A.setIdentity();
   }
   return true;
@@ -224,7 +228,7 @@ void FeatureTracker::Follow(int camera, const cv::Mat& image, double t_s) {
         ++counts_.lost;
       } else if (options_.align) {
         warps[i].z_px = AsVector(found[i]);
-        kept[i] = Align(smooth, warps[i], &c.points[i]);
+        kept[i] = Align(smooth, c.theta, warps[i], &c.points[i]);
         if (!kept[i]) ++counts_.changed;
       }
     }
@@ -281,7 +285,8 @@ void FeatureTracker::Replenish(int camera, const std::vector<char>& present) {
     if (static_cast<int>(c.points.size()) >= options_.max_tracks) break;
     Point point{next_landmark_++, corner, nullptr};
     if (options_.align) {
-      point.patch = std::make_shared<PatchTemplate>(c.smooth, AsVector(corner));
+      point.patch = std::make_shared<PatchTemplate>(
+          c.smooth, AsVector(corner), CurvatureAt(c.theta, AsVector(corner)));
     }
     c.points.push_back(std::move(point));
     ++counts_.begun;
@@ -351,7 +356,7 @@ void FeatureTracker::MatchNew(const Camera& from,
       match.z_px = found[n];
       if (options_.align) {
         warps[n].z_px = AsVector(found[n]);
-        if (!Align(to->smooth, warps[n], &match)) continue;
+        if (!Align(to->smooth, to->theta, warps[n], &match)) continue;
       }
       still_open[index[n]] = 0;
       if (HasRoom(*to, match.z_px)) {

@@ -128,7 +128,10 @@ class FeatureTracker {
                     PatchWarp* warp) const;
   // Moves a point to where its patch is, from warp.z_px. False if it is not
   // there.
-  bool Align(const cv::Mat& smooth, PatchWarp warp, Point* point) const;
+  bool Align(const cv::Mat& smooth,
+             const CameraCalibration& camera,
+             PatchWarp warp,
+             Point* point) const;
 
   void Follow(int camera, const cv::Mat& image, double t_s);
   // Ends the points of a camera that do not agree with one motion; `before` has

@@ -32,7 +32,9 @@ float GreyAt(const cv::Mat& image, float x, float y) {
 }  // namespace
 
 PatchTemplate::PatchTemplate(const cv::Mat& image,
-                             const Eigen::Vector2d& z_px) {
+                             const Eigen::Vector2d& z_px,
+                             const LensCurvature& curvature)
+    : curvature_(curvature) {
   Eigen::Matrix<float, kPixels, kParameters> derivatives;
   int i = 0;
   for (int dy = -kReach_px; dy <= kReach_px; ++dy) {
@@ -63,41 +65,49 @@ PatchTemplate::PatchTemplate(const cv::Mat& image,
 
 bool PatchTemplate::Sample(const cv::Mat& image,
                            const PatchWarp& warp,
+                           const LensCurvature& bend,
                            Values* values) const {
-  const double reach_x =
-      kReach_px * (std::abs(warp.A(0, 0)) + std::abs(warp.A(0, 1)));
-  const double reach_y =
-      kReach_px * (std::abs(warp.A(1, 0)) + std::abs(warp.A(1, 1)));
+  const Eigen::Vector2d reach =
+      kReach_px * warp.A.cwiseAbs().rowwise().sum() +
+      kReach_px * kReach_px * bend.cwiseAbs().rowwise().sum();
   // False for NaN, too; the margin is for rounding.
   constexpr double kMargin = 0.01;
-  const bool inside = warp.z_px.x() - reach_x > kMargin &&
-                      warp.z_px.y() - reach_y > kMargin &&
-                      warp.z_px.x() + reach_x < image.cols - 1 - kMargin &&
-                      warp.z_px.y() + reach_y < image.rows - 1 - kMargin;
+  const bool inside = warp.z_px.x() - reach.x() > kMargin &&
+                      warp.z_px.y() - reach.y() > kMargin &&
+                      warp.z_px.x() + reach.x() < image.cols - 1 - kMargin &&
+                      warp.z_px.y() + reach.y() < image.rows - 1 - kMargin;
   if (!inside) return false;
   const Eigen::Matrix2f A = warp.A.cast<float>();
   const Eigen::Vector2f z = warp.z_px.cast<float>();
+  const Eigen::Matrix<float, 2, 3> Q = bend.cast<float>();
   int i = 0;
   for (int dy = -kReach_px; dy <= kReach_px; ++dy) {
-    float x = z.x() - kReach_px * A(0, 0) + static_cast<float>(dy) * A(0, 1);
-    float y = z.y() - kReach_px * A(1, 0) + static_cast<float>(dy) * A(1, 1);
+    const auto fy = static_cast<float>(dy);
+    const Eigen::Vector2f row = z + fy * A.col(1) + fy * fy * Q.col(2);
+    const Eigen::Vector2f by_x = A.col(0) + fy * Q.col(1);
     for (int dx = -kReach_px; dx <= kReach_px; ++dx, ++i) {
-      (*values)[i] = GreyAt(image, x, y);
-      x += A(0, 0);
-      y += A(1, 0);
+      const auto fx = static_cast<float>(dx);
+      const Eigen::Vector2f place = row + fx * by_x + fx * fx * Q.col(0);
+      (*values)[i] = GreyAt(image, place.x(), place.y());
     }
   }
   return true;
 }
 
-double PatchTemplate::Align(const cv::Mat& image, PatchWarp* warp) const {
+double PatchTemplate::Align(const cv::Mat& image,
+                            const LensCurvature& curvature,
+                            PatchWarp* warp) const {
+  const auto sample = [&](const PatchWarp& w, Values* values) {
+    return Sample(
+        image, w, CurvatureOfWarp(curvature_, w.A, curvature), values);
+  };
   PatchWarp w = *warp;
   Values sampled;
   double gain = 1;
   double offset = 0;
   bool converged = false;
   for (int k = 0; k < kIterations && !converged; ++k) {
-    if (!Sample(image, w, &sampled)) return 0;
+    if (!sample(w, &sampled)) return 0;
     const Values residuals = sampled - static_cast<float>(gain) * greys_ -
                              Values::Constant(static_cast<float>(offset));
     const Eigen::Matrix<double, kParameters, 1> step =
@@ -119,7 +129,7 @@ double PatchTemplate::Align(const cv::Mat& image, PatchWarp* warp) const {
     }
     converged = moved.norm() < kConverged_px;
   }
-  if (!converged || !Sample(image, w, &sampled)) return 0;
+  if (!converged || !sample(w, &sampled)) return 0;
   const float mean_a = weights_.dot(greys_);
   const float mean_b = weights_.dot(sampled);
   const Values a = greys_ - Values::Constant(mean_a);

@@ -1,6 +1,9 @@
 // The patch about a point as it was first seen, and where it is in another
 // image: an affine warp, a gain and an offset of the grey (inverse
-// compositional, Baker and Matthews 2004).
+// compositional, Baker and Matthews 2004). What the lens bends beyond the
+// affine warp is known from its model: left out, it would move points towards
+// the middle of a wide-angle image by a hundredth of a pixel, and with them the
+// focal length.
 //
 // Tracks that are aligned to their first patch do not drift, as they would from
 // image to image, and a rotation of the camera does not move them. Immutable
@@ -11,10 +14,12 @@
 #include <array>
 #include <opencv2/core.hpp>
 
+#include "client/tracking/lens_curvature.h"
+
 namespace selfcal::client {
 
 // Takes a point x of the patch, relative to its centre, to A x + z of the
-// image.
+// image, but for the curvature of the lens.
 struct PatchWarp {
   Eigen::Matrix2d A = Eigen::Matrix2d::Identity();
   Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
@@ -27,12 +32,17 @@ class PatchTemplate {
 
   // Images are of 8 bits, and smoothed, as their greys are interpolated.
   // Requires the point to be kReach_px + 2 inside the image.
-  PatchTemplate(const cv::Mat& image, const Eigen::Vector2d& z_px);
+  PatchTemplate(const cv::Mat& image,
+                const Eigen::Vector2d& z_px,
+                const LensCurvature& curvature);
 
-  // Aligns the patch to an image, from a warp that is wrong by about a pixel.
-  // Returns the correlation of the greys of both, in [-1, 1], or 0 if the warp
-  // leaves the image or does not converge; then *warp is unchanged.
-  double Align(const cv::Mat& image, PatchWarp* warp) const;
+  // Aligns the patch to an image, from a warp that is wrong by about a pixel,
+  // to a place where the lens of that image has this curvature. Returns the
+  // correlation of the greys of both, in [-1, 1], or 0 if the warp leaves the
+  // image or does not converge; then *warp is unchanged.
+  double Align(const cv::Mat& image,
+               const LensCurvature& curvature,
+               PatchWarp* warp) const;
 
  private:
   static constexpr int kSide = 2 * kReach_px + 1;
@@ -43,8 +53,10 @@ class PatchTemplate {
 
   bool Sample(const cv::Mat& image,
               const PatchWarp& warp,
+              const LensCurvature& bend,
               Values* values) const;
 
+  LensCurvature curvature_;
   Values greys_;
   Values weights_;
   // Derivatives of the greys by the parameters, times the weights.
