@@ -18,8 +18,8 @@ struct RigInput {
   // One file with proto3 JSON of selfcal.v1.Rig, "-" for stdin; or the files of
   // the tool that `from` names.
   std::vector<std::string> files;
-  std::string from;    // a format of client/formats
-  std::string vi_map;  // folder of a VI-map, instead of files
+  std::string from;         // a format of client/formats
+  std::string vi_map;       // folder of a VI-map, instead of files
   std::optional<Rig> base;  // instead of files: what a recording says
   std::optional<double> imu_rate_hz;
   bool strict = false;  // fail if reading `from` has losses

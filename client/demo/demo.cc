@@ -6,9 +6,9 @@
 #include <memory>
 #include <utility>
 
-#include "client/process/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "client/demo/stream_segments.h"
+#include "client/process/daemon_process.h"
 #include "client/text/text.h"
 
 namespace selfcal::client {

@@ -26,9 +26,9 @@ struct CalibrationStart {
 // Compares the rotations of each camera with those of the gyroscope over the
 // first 20 s of a recording (core/initialisation): for the time offset and, as
 // far as `unknown` says so, its rotation and focal length. Then estimates the
-// motion of the first 40 s, and calibrates on it: with that start, motions are right to
-// millimetres instead of decimetres, and tracks to a fraction of a pixel
-// instead of several, which what looks for mistakes in the data takes for
+// motion of the first 40 s, and calibrates on it: with that start, motions are
+// right to millimetres instead of decimetres, and tracks to a fraction of a
+// pixel instead of several, which what looks for mistakes in the data takes for
 // granted. Directions of theta that these segments do not show keep their
 // factory value.
 //

@@ -18,8 +18,8 @@
 #include <thread>
 #include <vector>
 
-#include "client/process/daemon_process.h"
 #include "client/demo/daemon_view.h"
+#include "client/process/daemon_process.h"
 #include "client/selfcal/client.h"
 #include "client/selfcal/segment_builder.h"
 #include "core/simulation/simulate.h"

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "client/process/daemon_process.h"
 #include "client/demo/daemon_view.h"
+#include "client/process/daemon_process.h"
 #include "test/support/temp_folder.h"
 
 namespace selfcal::client {

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <string>
 
-#include "client/process/daemon_process.h"
 #include "client/demo/daemon_view.h"
+#include "client/process/daemon_process.h"
 #include "proto/convert.h"
 #include "test/support/temp_folder.h"
 
