@@ -161,7 +161,7 @@ double RmsOf(const Outcome& outcome,
 }  // namespace
 
 void RunRecordingsRaw(Context* context) {
-  const double seconds = context->quick() ? 10 : 40;
+  const double seconds = context->quick() ? 10 : 20;
   std::vector<RawRecording> all = AllRecordings();
   if (context->quick()) all.resize(1);
   std::vector<std::optional<Outcome>> outcomes(all.size());

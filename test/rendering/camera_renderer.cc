@@ -199,9 +199,14 @@ void CameraRenderer::Render(const Scene& scene,
         const double row_s = t_s + v * line_delay_s_ + phase * exposure_s;
         Place(scene, trajectory.At(row_s), row_s, &solids);
       }
-      // Rays take the levels above and below by turns.
+      // Rays take the levels above and below by turns, in an order that has
+      // nothing to do with time: sharper rays early in the exposure would make
+      // the image look as if it were exposed earlier.
+      constexpr float kOrder[kPattern] = {2, 0, 3, 1};
       const float level_shift =
-          (static_cast<float>(k) + 0.5F) / static_cast<float>(rays);
+          (kOrder[k % kPattern] + (static_cast<float>(k / kPattern) + 0.5F) *
+                                      kPattern / static_cast<float>(rays)) /
+          kPattern;
       AddRow(scene.texture, solids, v, k % kPattern, level_shift, sums.data());
     }
   }

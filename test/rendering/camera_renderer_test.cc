@@ -232,6 +232,33 @@ TEST(CameraRenderer, EdgesAreBlurredByTheMotionDuringTheExposure) {
   }
 }
 
+// The opposite motion exposes the same poses in the opposite order.
+TEST(CameraRenderer, ExposureDoesNotDependOnTheDirectionOfTime) {
+  const CameraCalibration camera = ForwardCamera(
+      LensRig(DistortionModel::kRadialTangential).factory.cameras[0]);
+  Scene scene{MakeLeafTexture(3), {}, {}, {}};
+  scene.room.half_m = {2, 2, 2};
+  scene.offsets = {Eigen::Vector2d::Zero()};
+  const double radps = 2, exposure_s = 0.003;
+  const auto image = [&](double sign) {
+    const SteadyMotion motion({0, 0, sign * radps}, Eigen::Vector3d::Zero());
+    return Rendered(camera, scene, motion, 1, exposure_s);
+  };
+  const cv::Mat one = image(1), other = image(-1);
+  // The shift between both, by least squares.
+  double product = 0, square = 0;
+  for (int v = 20; v < one.rows - 20; ++v) {
+    for (int u = 20; u < one.cols - 20; ++u) {
+      const double gradient =
+          (one.at<float>(v, u + 1) - one.at<float>(v, u - 1)) / 2;
+      product += gradient * (one.at<float>(v, u) - other.at<float>(v, u));
+      square += gradient * gradient;
+    }
+  }
+  const double blur_px = camera.f.x() * radps * exposure_s;
+  EXPECT_LT(std::abs(product / square), 2e-3 * blur_px);
+}
+
 TEST(CameraRenderer, SurfacesAreThoseThatRaysMeet) {
   // A texture without contrast: pixels show the brightness of the face.
   const auto trajectory = MakeHandheld(10, 1, 4);
