@@ -292,13 +292,11 @@ void AddCalibrate(CLI::App* app, Context* context) {
   const auto input = std::make_shared<CalibrateInput>();
   input->rig.id = "device";
   AddRecordingsOptions(command, &input->recordings);
-  command
-      ->add_option("--output",
-                   input->output,
-                   "Folder for the report, the calibration in the files of "
-                   "every tool that can express it, and the state, which "
-                   "`selfcald --state-dir` can go on with")
-      ->required();
+  command->add_option("--output",
+                      input->output,
+                      "Folder for the report, the calibration in the files of "
+                      "every tool that can express it, and the state, which "
+                      "`selfcald --state-dir` can go on with");
   command
       ->add_option("--from",
                    input->from,
@@ -346,6 +344,12 @@ void AddCalibrate(CLI::App* app, Context* context) {
       input->daemon,
       "The program selfcald [beside this program, or on the path]");
   command->callback([context, input] {
+    if (input->output.empty()) {
+      throw CLI::ValidationError(
+          "--output",
+          "is required, for recordings; a rig of a daemon is calibrated by "
+          "`selfcal run start RIG`");
+    }
     context->command = [context, input] { return Calibrate(context, *input); };
   });
 }

@@ -39,8 +39,13 @@ class Bends {
     const auto here = MinimumAt(Eigen::VectorXd::Zero(steps.rows()));
     if (!here) return bends;
     for (int j = 0; j < steps.cols(); ++j) {
-      const auto bend = AlongOne(*here, steps.col(j), information(j));
-      if (!bend) continue;
+      auto bend = AlongOne(*here, steps.col(j), information(j));
+      if (!bend || !bend->allFinite()) continue;
+      // The prior holds for the others as well: a parabola that leads beyond it
+      // describes nothing.
+      const double priors =
+          bend->cwiseQuotient(PriorSigmas(point_.rig())).norm();
+      if (priors > 1) *bend /= priors;
       bends.conservativeResize(Eigen::NoChange, bends.cols() + 1);
       bends.rightCols<1>() = *bend;
     }

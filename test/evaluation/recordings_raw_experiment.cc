@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/odometry/odometry.h"
+#include "client/odometry/start.h"
 #include "core/calibration/calibrate.h"
 #include "core/calibration/theta_prior.h"
 #include "test/client/tracking/recording_kinds.h"
@@ -97,8 +98,14 @@ CalibrationResult CalibrateOn(const Rig& rig,
 
 std::optional<Outcome> RunOne(const RawRecording& raw, double seconds) {
   const RenderedRecording rendered = Render(raw.kind, seconds, raw.seed);
-  const Rig rig = StartOf(raw.kind.rig);
+  Rig rig = StartOf(raw.kind.rig);
   client::RenderedSource source(rendered);
+  const auto start = client::FindStart(
+      &source,
+      rig,
+      std::vector<client::UnknownOfCamera>(rig.factory.cameras.size()));
+  if (!start.ok()) return std::nullopt;
+  rig.factory = start->theta;
   client::Odometry odometry(&source, rig, rig.factory, {.session = raw.name});
   Outcome outcome;
   std::vector<MotionSegment> segments;

@@ -5,6 +5,7 @@ calibrate_test.py SELFCAL SELFCALD RENDER
 
 import json
 import math
+import os
 import pathlib
 import re
 import shutil
@@ -194,6 +195,30 @@ class Calibrate(unittest.TestCase):
             text=True,
         )
         self.assertEqual(len(listed.stdout.splitlines()), 5)
+
+
+class RealImages(unittest.TestCase):
+    """Five seconds of a drone that hardly moves: no calibration follows, and
+    no component is far less certain than it was before."""
+
+    def test_says_that_there_is_too_little_motion(self) -> None:
+        data = os.environ.get(
+            "SELFCAL_TEST_DATA",
+            pathlib.Path(__file__).parents[4] / "shared/data",
+        )
+        images = pathlib.Path(data) / "euroc_images"
+        if not images.exists():
+            self.skipTest(f"no recordings beside the checkout: {images}")
+        folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, folder)
+        done = calibrate(images, folder / "output")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("Send more motion", done.stderr)
+        rows = [line.split("\t") for line in done.stdout.splitlines()]
+        sigmas = {row[0]: float(row[3]) for row in rows if len(row) == 4}
+        for camera in "cam0", "cam1":
+            self.assertLess(sigmas[f"{camera}.focal.x"], 3 * 23)
+            self.assertLess(sigmas[f"{camera}.p_CI.x"], 3 * 0.05)
 
 
 class Broken(unittest.TestCase):

@@ -53,7 +53,7 @@ TEST_F(Usage, TheTwelveMostFrequentMistakesAreLedOn) {
       {{"list"}, 2, "selfcal rig list"},
       {{"show", "tablet"}, 2, "selfcal rig show"},
       {{"status"}, 2, "did you mean 'selfcal daemon top'?"},
-      {{"calibrate", "tablet"}, 2, "did you mean 'selfcal run start'?"},
+      {{"calibrate", "tablet"}, 2, "`selfcal run start RIG`"},
       {{"rig", "ls"}, 2, "did you mean 'selfcal rig list'?"},
       {{"segment", "import", map, "tablet"}, 2, "the rig comes first"},
       {{"rig", "create"}, 2, "FILE, --from FORMAT FILE... or --vi-map DIR"},

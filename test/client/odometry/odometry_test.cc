@@ -5,11 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/calibration/calibrate.h"
+#include "core/calibration/theta_prior.h"
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
 #include "test/rendering/rendered_source.h"
@@ -238,6 +241,51 @@ TEST(Odometry, RefusesImagesOfAnotherSize) {
   EXPECT_EQ(next.status().message(),
             "the images of cam0 have 2 x 2 px, while the calibration is for "
             "640 x 480 px");
+}
+
+// Images of EuRoC V1_01, of a drone that hardly moves: the motion is found, and
+// a calibration on it is about as uncertain as the factory's.
+TEST(Odometry, FindsTheMotionOfRealImages) {
+  const std::filesystem::path folder =
+      std::filesystem::path(SELFCAL_DATA_DIR) / "euroc_images";
+  if (!std::filesystem::exists(folder)) {
+    GTEST_SKIP() << "no recordings beside the checkout: " << folder;
+  }
+  auto recording = OpenRecording(folder, {});
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  Rig rig = HandheldRig("euroc");
+  rig.factory = {};
+  rig.pixel_sigma_px = 0.5;
+  for (const RecordedCamera& camera : (*recording)->cameras()) {
+    rig.factory.cameras.push_back(*camera.calibration);
+  }
+  rig.blocks = {{"*.time_offset", true}};
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  rig.prior_sigmas = {{"*.focal.*", 20},
+                      {"*.principal.*", 15},
+                      {"*.q_CI.*", 0.05},
+                      {"*.p_CI.*", 0.05},
+                      {"*.time_offset", 0.05}};
+  Odometry odometry(recording->get(), rig, rig.factory, {.session = "v1_01"});
+  auto next = odometry.Next(rig.factory, 1);
+  ASSERT_TRUE(next.ok()) << next.status();
+  ASSERT_TRUE(next->has_value());
+  const OdometrySegment& found = **next;
+  EXPECT_EQ(found.failure, "");
+  EXPECT_LT(found.reprojection_rms_px, 1);
+  EXPECT_TRUE(Validate(found.segment, rig.factory).empty());
+  CalibrateOptions options;
+  options.prior = FactoryPrior(rig);
+  const CalibrationResult result =
+      Calibrate(rig, rig.factory, {found.segment}, options);
+  ASSERT_GT(result.covariance.size(), 0);
+  const Eigen::VectorXd sigmas = result.covariance.diagonal().cwiseSqrt();
+  const Eigen::VectorXd priors = PriorSigmas(rig);
+  const std::vector<TangentComponent> components =
+      TangentComponents(rig.factory);
+  for (const int i : FreeComponents(rig)) {
+    EXPECT_LT(sigmas[i], 3 * priors[i]) << components[i].name;
+  }
 }
 
 }  // namespace
