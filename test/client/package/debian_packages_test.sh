@@ -82,7 +82,7 @@ for program in "${programs[@]}"; do
   needed=$(readelf -d "$program" | grep NEEDED)
   [[ $needed == *libstdc++* ]] || fail "cannot read what $program links"
   [[ $needed != *libspqr* ]] || fail "$program links SuiteSparseQR"
-  [[ $ceres == ON && $program == */selfcald || $needed != *libcholmod* ]] ||
+  [[ $ceres == ON && $program == */selfcal@(d|) || $needed != *libcholmod* ]] ||
     fail "$program links CHOLMOD"
 done
 
