@@ -2,6 +2,8 @@
 // of `selfcal calibrate`: the front end's tracks with their real errors, the
 // motion without a SLAM system, and a start of which little is known. Is the
 // sigma honest then?
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -83,7 +85,9 @@ struct Outcome {
   CalibrationResult result;
   Eigen::VectorXd error;
   double nees = 0;
-  double halves = 0;  // squared difference of two halves, normalised
+  // Squared difference of two halves, normalised; nothing if one of them does
+  // not converge.
+  std::optional<double> halves;
   int free = 0;
   int segments = 0;
   int failed = 0;
@@ -133,13 +137,13 @@ std::optional<Outcome> RunOne(const RawRecording& raw, double seconds) {
       CalibrateOn(rig, {segments.begin(), segments.begin() + half});
   const CalibrationResult second =
       CalibrateOn(rig, {segments.begin() + half, segments.end()});
-  if (first.status != CalibrateStatus::kConverged ||
-      second.status != CalibrateStatus::kConverged) {
-    return std::nullopt;
+  if (first.status == CalibrateStatus::kConverged &&
+      second.status == CalibrateStatus::kConverged) {
+    outcome.halves =
+        NormalisedSquaredError(BoxMinus(first.theta, second.theta),
+                               first.covariance + second.covariance)
+            .nees;
   }
-  outcome.halves = NormalisedSquaredError(BoxMinus(first.theta, second.theta),
-                                          first.covariance + second.covariance)
-                       .nees;
   return outcome;
 }
 
@@ -188,8 +192,8 @@ void RunRecordingsRaw(Context* context) {
                      "q_CI [mrad]",
                      "p_CI [mm]",
                      "offset [us]"});
-  double within = 0, components = 0, failed = 0, nees = 0, halves = 0;
-  double expected = 0;
+  double within = 0, components = 0, failed = 0, nees = 0, expected = 0;
+  double halves = 0, expected_of_halves = 0, halves_failed = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!outcomes[i]) {
       ++failed;
@@ -202,7 +206,7 @@ void RunRecordingsRaw(Context* context) {
                static_cast<long>(one.failed),
                one.nees,
                static_cast<long>(one.result.rank),
-               one.halves,
+               one.halves ? Cell(*one.halves) : Cell(),
                WorstInSigmas(one),
                RmsOf(one, rig, "*.focal.*"),
                RmsOf(one, rig, "*.principal.*"),
@@ -216,19 +220,27 @@ void RunRecordingsRaw(Context* context) {
       if (std::abs(one.error(c)) <= 3 * std::sqrt(variance)) ++within;
     }
     nees += one.nees;
-    halves += one.halves;
     expected += one.result.rank;
+    if (one.halves) {
+      halves += *one.halves;
+      expected_of_halves += one.result.rank;
+    } else {
+      ++halves_failed;
+    }
   }
   context->WriteTable("recordings_raw", table);
   context->AtMost("recordings_raw.not_calibrated", failed, 0, {.robust = true});
-  if (components == 0) return;
+  context->AtMost("recordings_raw.halves_not_converged", halves_failed, 0);
+  if (expected == 0 || expected_of_halves == 0) return;
   context->AtLeast("recordings_raw.within_3_sigma", within / components, 0.98);
   // 95 % of a chi-squared distribution with so many degrees of freedom.
-  const double spread = 1.96 * std::sqrt(2 * expected) / expected;
-  context->Within(
-      "recordings_raw.nees_ratio", nees / expected, 1 - spread, 1 + spread);
-  context->Within(
-      "recordings_raw.halves_ratio", halves / expected, 1 - spread, 1 + spread);
+  const auto within_bounds =
+      [&](const std::string& name, double sum, double degrees) {
+        const double spread = 1.96 * std::sqrt(2 / degrees);
+        context->Within(name, sum / degrees, 1 - spread, 1 + spread);
+      };
+  within_bounds("recordings_raw.nees_ratio", nees, expected);
+  within_bounds("recordings_raw.halves_ratio", halves, expected_of_halves);
 }
 
 }  // namespace selfcal
