@@ -35,7 +35,7 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
 #include "selfcal/v1/rig.grpc.pb.h"
-#include "selfcal/v1/segment.grpc.pb.h"
+#include "selfcal/v1/segment.pb.h"
 
 namespace selfcal::client {
 namespace {
@@ -66,8 +66,9 @@ std::string FindDaemon() {
   std::string rest = path == nullptr ? "" : path;
   while (!rest.empty()) {
     const std::size_t colon = std::min(rest.find(':'), rest.size());
-    if (colon > 0)
+    if (colon > 0) {
       places.push_back(fs::path(rest.substr(0, colon)) / "selfcald");
+    }
     rest.erase(0, colon + 1);
   }
   for (const fs::path& place : places) {
@@ -76,7 +77,7 @@ std::string FindDaemon() {
   return "selfcald";
 }
 
-// The command line has checked the name.
+// Requires a name that the command line has checked.
 DistortionModel ModelNamed(const std::string& name) {
   const auto models = DistortionModels();
   return *std::find_if(
@@ -148,59 +149,20 @@ int EnsureRig(Context* context,
   return status.ok() ? kDone : Fail(*context, status);
 }
 
-// The newest run; without a name if there is none.
-grpc::Status NewestRun(v1::RecalibrationService::StubInterface* stub,
-                       const std::string& rig,
-                       v1::Recalibration* run) {
-  using Service = v1::RecalibrationService::StubInterface;
-  v1::ListRecalibrationsRequest request;
-  request.set_parent(RigName(rig));
-  request.set_page_size(1);
-  v1::ListRecalibrationsResponse listed;
-  const grpc::Status status =
-      Call<Service>(stub, &Service::ListRecalibrations, request, &listed);
-  if (status.ok() && !listed.recalibrations().empty()) {
-    *run = listed.recalibrations(0);
-  }
-  return status;
-}
-
-// Whether all segments arrived before a run was created.
-grpc::Status HasAllSegments(Context* context,
-                            const std::string& rig,
-                            const v1::Recalibration& run,
-                            bool* all) {
-  using Service = v1::SegmentService::StubInterface;
-  const auto stub = v1::SegmentService::NewStub(context->Channel());
-  v1::ListSegmentsRequest request;
-  request.set_parent(RigName(rig));
-  request.set_order_by("receive_time desc");
-  request.set_page_size(1);
-  request.set_view(v1::ListSegmentsRequest::BASIC);
-  v1::ListSegmentsResponse listed;
-  const grpc::Status status =
-      Call<Service>(stub.get(), &Service::ListSegments, request, &listed);
-  *all = status.ok() && !listed.segments().empty() &&
-         google::protobuf::util::TimeUtil::TimestampToNanoseconds(
-             listed.segments(0).receive_time()) <=
-             google::protobuf::util::TimeUtil::TimestampToNanoseconds(
-                 run.create_time());
-  return status;
-}
-
 // Calibrates on all segments, unless a run has succeeded since the last of them
 // came, and shows the result.
 int Recalibrate(Context* context, const std::string& rig) {
   using Service = v1::RecalibrationService::StubInterface;
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::Recalibration last;
-  grpc::Status status = NewestRun(stub.get(), rig, &last);
-  bool done = false;
-  if (status.ok() && last.state() == v1::Recalibration::SUCCEEDED) {
-    status = HasAllSegments(context, rig, last, &done);
-  }
+  v1::Segment newest;
+  grpc::Status status = ReadNewestRun(stub.get(), rig, &last);
+  if (status.ok()) status = ReadNewestSegment(context, rig, "", &newest);
   if (!status.ok()) return Fail(*context, status);
-  if (done) return FollowRun(context, stub.get(), std::move(last));
+  if (last.state() == v1::Recalibration::SUCCEEDED &&
+      newest.receive_time() <= last.create_time()) {
+    return FollowRun(context, stub.get(), std::move(last));
+  }
   v1::StartRecalibrationRequest request;
   request.set_parent(RigName(rig));
   request.set_force(true);

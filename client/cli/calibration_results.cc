@@ -10,17 +10,14 @@
 #include "client/cli/foreign_files.h"
 #include "client/cli/report_file.h"
 #include "client/formats/format.h"
-#include "proto/convert.h"
-#include "proto/resource_names.h"
-#include "selfcal/v1/calibration_service.grpc.pb.h"
 
 namespace selfcal::client {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Files of the tools that can express the calibration. A tool that cannot is
-// named with its reason.
+// Writes files for the tools that can express the calibration. A tool that
+// cannot is named with its reason.
 absl::Status WriteForTools(const Rig& rig,
                            const Calibration& theta,
                            const fs::path& folder,
@@ -53,33 +50,15 @@ int WriteResults(Context* context,
                  const std::string& rig_id,
                  const std::string& folder,
                  std::optional<double> imu_rate_hz) {
-  v1::Rig message;
-  grpc::Status status = ReadDevice(context, rig_id, &message);
-  if (!status.ok()) return Fail(*context, status);
-  using Service = v1::CalibrationService::StubInterface;
-  const auto stub = v1::CalibrationService::NewStub(context->Channel());
-  v1::GetCalibrationRequest request;
-  request.set_name(ChildName(rig_id, "calibrations", "active"));
-  v1::Calibration calibration;
-  status = Call<Service>(
-      stub.get(), &Service::GetCalibration, request, &calibration);
-  if (!status.ok()) return Fail(*context, status);
+  DeviceVersion active;
+  const grpc::Status read =
+      ReadDeviceVersion(context, rig_id, "active", &active);
+  if (!read.ok()) return Fail(*context, read);
+  const v1::Calibration& calibration = active.message;
   if (calibration.verdict().kind() == v1::Verdict::FACTORY) return kFailed;
-
-  Rig rig;
-  Calibration theta;
-  auto faults = FromProto(message, "rig", &rig);
-  if (faults.empty()) {
-    faults = FromProto(calibration.parameters(), "parameters", &theta);
-  }
-  if (!faults.empty()) {
-    PrintError(fmt::format("the daemon's answer cannot be read: {} {}",
-                           faults[0].field,
-                           faults[0].message));
-    return kFailed;
-  }
   const fs::path to(folder);
-  absl::Status written = WriteForTools(rig, theta, to, imu_rate_hz);
+  absl::Status written =
+      WriteForTools(active.rig, active.theta, to, imu_rate_hz);
   if (written.ok()) {
     written = WriteTextFiles({{"calibration.json", ToJson(calibration, false)}},
                              {(to / "calibration.json").string()},

@@ -10,7 +10,7 @@
 
 namespace selfcal::client {
 
-// Of recordings; without OpenCV these commands say that they are missing.
+// Commands for recordings; without OpenCV they say that they are missing.
 void AddCalibrate(CLI::App* app, Context* context);
 void AddTrack(CLI::App* app, Context* context);
 void AddRigCommands(CLI::App* app, Context* context);

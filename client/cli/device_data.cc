@@ -67,6 +67,42 @@ grpc::Status ReadDevice(Context* context,
   return Call<Service>(stub.get(), &Service::GetRig, request, found);
 }
 
+grpc::Status ReadDeviceVersion(Context* context,
+                               const std::string& rig,
+                               const std::string& version,
+                               DeviceVersion* found) {
+  grpc::Status status = ReadDevice(context, rig, &found->rig_message);
+  if (!status.ok()) return status;
+  using Service = v1::CalibrationService::StubInterface;
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  v1::GetCalibrationRequest request;
+  request.set_name(ChildName(rig, "calibrations", version));
+  status = Call<Service>(
+      stub.get(), &Service::GetCalibration, request, &found->message);
+  if (!status.ok()) return status;
+  auto faults = FromProto(found->rig_message, "rig", &found->rig);
+  if (faults.empty()) {
+    faults =
+        FromProto(found->message.parameters(), "parameters", &found->theta);
+  }
+  if (faults.empty()) return status;
+  return {grpc::StatusCode::DATA_LOSS,
+          fmt::format("the daemon's answer cannot be read: {} {}",
+                      faults[0].field,
+                      faults[0].message)};
+}
+
+grpc::Status ReadNewestSegment(Context* context,
+                               const std::string& rig,
+                               const std::string& filter,
+                               v1::Segment* segment) {
+  const auto stub = v1::SegmentService::NewStub(context->Channel());
+  v1::ListSegmentsResponse listed;
+  const grpc::Status status = ListNewest(stub.get(), rig, filter, 1, &listed);
+  if (status.ok() && !listed.segments().empty()) *segment = listed.segments(0);
+  return status;
+}
+
 std::optional<Calibration> ReadVersion(Context* context,
                                        const Rig& rig,
                                        std::int64_t version) {

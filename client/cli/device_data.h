@@ -13,13 +13,37 @@
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
+#include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/rig.pb.h"
+#include "selfcal/v1/segment.pb.h"
 
 namespace selfcal::client {
 
 grpc::Status ReadDevice(Context* context,
                         const std::string& rig,
                         v1::Rig* found);
+
+// A version of a device, as messages and as values.
+struct DeviceVersion {
+  v1::Rig rig_message;
+  v1::Calibration message;
+  Rig rig;
+  Calibration theta;
+};
+
+// Reads a rig and a version of it, a number or "active". DATA_LOSS if the
+// daemon's answer is not valid.
+grpc::Status ReadDeviceVersion(Context* context,
+                               const std::string& rig,
+                               const std::string& version,
+                               DeviceVersion* found);
+
+// Reads the newest segment that meets the filter, without its data; it has no
+// name if there is none.
+grpc::Status ReadNewestSegment(Context* context,
+                               const std::string& rig,
+                               const std::string& filter,
+                               v1::Segment* segment);
 
 // Returns the parameters of a version; nullopt if the daemon does not have it.
 std::optional<Calibration> ReadVersion(Context* context,

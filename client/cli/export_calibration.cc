@@ -6,11 +6,8 @@
 #include <string>
 
 #include "client/cli/commands.h"
+#include "client/cli/device_data.h"
 #include "client/cli/foreign_files.h"
-#include "proto/convert.h"
-#include "proto/resource_names.h"
-#include "selfcal/v1/calibration_service.grpc.pb.h"
-#include "selfcal/v1/rig.grpc.pb.h"
 
 namespace selfcal::client {
 namespace {
@@ -24,42 +21,6 @@ struct ExportInput {
   bool strict = false;
   bool force = false;
 };
-
-struct Source {
-  Rig rig;
-  Calibration theta;
-};
-
-// Reads the rig and the version. Returns kDone, or prints an error.
-int Fetch(const Context& context, const ExportInput& input, Source* source) {
-  const auto rigs = v1::RigService::NewStub(context.Channel());
-  v1::GetRigRequest rig_request;
-  rig_request.set_name(RigName(input.rig));
-  v1::Rig rig;
-  using Rigs = v1::RigService::StubInterface;
-  grpc::Status status =
-      Call<Rigs>(rigs.get(), &Rigs::GetRig, rig_request, &rig);
-  if (!status.ok()) return Fail(context, status);
-
-  const auto calibrations = v1::CalibrationService::NewStub(context.Channel());
-  v1::GetCalibrationRequest request;
-  request.set_name(ChildName(input.rig, "calibrations", input.version));
-  v1::Calibration calibration;
-  using Calibrations = v1::CalibrationService::StubInterface;
-  status = Call<Calibrations>(
-      calibrations.get(), &Calibrations::GetCalibration, request, &calibration);
-  if (!status.ok()) return Fail(context, status);
-
-  std::vector<Violation> faults = FromProto(rig, "rig", &source->rig);
-  if (faults.empty()) {
-    faults = FromProto(calibration.parameters(), "parameters", &source->theta);
-  }
-  if (faults.empty()) return kDone;
-  PrintError(fmt::format("the daemon's answer cannot be read: {} {}",
-                         faults[0].field,
-                         faults[0].message));
-  return kFailed;
-}
 
 google::protobuf::Struct FilesMessage(const std::vector<std::string>& paths,
                                       const std::vector<Loss>& losses) {
@@ -80,10 +41,10 @@ google::protobuf::Struct FilesMessage(const std::vector<std::string>& paths,
 }
 
 int ExportCalibration(Context* context, const ExportInput& input) {
-  Source source;
-  if (const int code = Fetch(*context, input, &source); code != kDone) {
-    return code;
-  }
+  DeviceVersion source;
+  const grpc::Status read =
+      ReadDeviceVersion(context, input.rig, input.version, &source);
+  if (!read.ok()) return Fail(*context, read);
   const auto exported = ExportRig(input.format,
                                   source.rig,
                                   source.theta,

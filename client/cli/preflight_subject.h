@@ -1,4 +1,4 @@
-// What a pre-flight check looks at.
+// The subject of a pre-flight check: a rig, a calibration and segments.
 #pragma once
 
 #include <grpcpp/support/status.h>

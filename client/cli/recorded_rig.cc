@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "client/cli/extrinsics_input.h"
 #include "core/model/camera.h"
 #include "core/model/camera_model.h"
+#include "core/model/median.h"
 
 namespace selfcal::client {
 namespace {
@@ -18,14 +19,13 @@ constexpr double kPrincipalTolerance = 0.02;  // of the width
 constexpr double kRotationTolerance_rad = 0.05;
 constexpr double kPositionTolerance_m = 0.05;
 constexpr double kOffsetTolerance_s = 0.05;
-// Of what is not stated.
-// The scale in the middle of the image [1/rad], times its width: lenses of 64
-// and of 160 degrees.
+// The scale in the middle of the image [1/rad], times its width, of a
+// camera that nothing states: lenses of 64 and of 160 degrees.
 constexpr double kGuessedFocal = 0.8;
 constexpr double kGuessedWideFocal = 0.36;
 constexpr double kGuessedFocalTolerance = 0.3;
 constexpr double kGuessedPosition_m = 0.1;
-// Of a tracked point, with what is systematic in it.
+// Noise of a tracked point, with what is systematic in it.
 constexpr double kPixelSigma_px = 0.5;
 
 bool IsPinhole(DistortionModel model) {
@@ -90,7 +90,7 @@ absl::StatusOr<Stated> StatedBy(Recording* recording,
   return stated;
 }
 
-// What precedes the settings of the user, which take precedence.
+// Adds tolerances before the settings of the user, which take precedence.
 void AddTolerances(const v1::Rig& rig,
                    const std::vector<UnknownOfCamera>& unknown,
                    RigInput* input) {
@@ -129,10 +129,7 @@ double ImuRate(const Recording& recording) {
     steps_ns.push_back(imu[i].t_ns - imu[i - 1].t_ns);
   }
   if (steps_ns.empty()) return 1;
-  const auto middle =
-      steps_ns.begin() + static_cast<std::ptrdiff_t>(steps_ns.size() / 2);
-  std::nth_element(steps_ns.begin(), middle, steps_ns.end());
-  return 1e9 / static_cast<double>(*middle);
+  return 1e9 / static_cast<double>(UpperMedian(std::move(steps_ns)));
 }
 
 absl::StatusOr<RecordedRig> ReadRecordedRig(

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <map>
 #include <utility>
 
 #include "client/cli/context.h"
@@ -61,17 +60,16 @@ void AddRecordingsOptions(CLI::App* command, RecordingsInput* input) {
 absl::StatusOr<std::vector<RecordedSession>> OpenSessions(
     const RecordingsInput& input) {
   std::vector<RecordedSession> sessions;
-  std::map<std::string, int> names;
   for (const std::string& path : input.paths) {
     auto recording = OpenRecording(path, input.topics);
     if (!recording.ok()) return recording.status();
-    std::string name = NameOf(path);
-    if (const int number = ++names[name]; number > 1) {
-      name = fmt::format("{}-{}", name, number);
-    }
     for (const std::string& problem : (*recording)->problems()) {
       PrintError(problem);
     }
+    const std::string name = fmt::format(
+        "{}-{}",
+        NameOf(path),
+        (*recording)->cameras().front().image_times_ns.front() / 1'000'000);
     sessions.push_back({name, *std::move(recording)});
     const std::size_t cameras = sessions.back().recording->cameras().size();
     const std::size_t first = sessions.front().recording->cameras().size();

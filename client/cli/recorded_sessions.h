@@ -28,9 +28,10 @@ struct RecordedSession {
 // --keyframe-rate. `input` must outlive the command.
 void AddRecordingsOptions(CLI::App* command, RecordingsInput* input);
 
-// Opens all recordings, and prints what was left out of them. Sessions have the
-// names of their files, without folder and ending; the second of a name gets
-// "-2". INVALID_ARGUMENT for recordings with different numbers of cameras.
+// Opens all recordings, and prints what was left out of them. A session has the
+// name of its file, without folder and ending, and the time of the first image
+// [ms]: another recording of the same name is another session.
+// INVALID_ARGUMENT for recordings with different numbers of cameras.
 absl::StatusOr<std::vector<RecordedSession>> OpenSessions(
     const RecordingsInput& input);
 

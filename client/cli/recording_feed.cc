@@ -3,20 +3,19 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <memory>
 #include <mutex>
-#include <optional>
+#include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include "client/cli/device_data.h"
 #include "client/cli/error_lines.h"
 #include "client/cli/progress.h"
+#include "client/cli/run_following.h"
 #include "client/odometry/odometry.h"
 #include "client/selfcal/client.h"
-#include "proto/convert.h"
 #include "proto/resource_names.h"
-#include "selfcal/v1/calibration_service.grpc.pb.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 
@@ -24,33 +23,10 @@ namespace selfcal::client {
 namespace {
 
 using SegmentService = v1::SegmentService::StubInterface;
-using CalibrationService = v1::CalibrationService::StubInterface;
 using RecalibrationService = v1::RecalibrationService::StubInterface;
 
 constexpr std::chrono::milliseconds kPollEvery{20};
 constexpr std::chrono::seconds kAcknowledgement{60};
-
-struct ActiveVersion {
-  std::int64_t version = 0;
-  Calibration theta;
-};
-
-struct LastSegment {
-  std::int64_t index = 0;
-  std::int64_t end_ns = 0;
-};
-
-bool IsUnfinished(const v1::Recalibration& run) {
-  return run.state() == v1::Recalibration::PENDING ||
-         run.state() == v1::Recalibration::RUNNING;
-}
-
-grpc::Status Unreadable(const std::vector<Violation>& faults) {
-  return {grpc::StatusCode::DATA_LOSS,
-          fmt::format("the daemon's answer cannot be read: {} {}",
-                      faults[0].field,
-                      faults[0].message)};
-}
 
 class Feed {
  public:
@@ -59,41 +35,44 @@ class Feed {
         options_(options),
         counts_(counts),
         segments_(v1::SegmentService::NewStub(context->Channel())),
-        calibrations_(v1::CalibrationService::NewStub(context->Channel())),
         runs_(v1::RecalibrationService::NewStub(context->Channel())),
         progress_(options.session),
         stream_(Connection(),
                 [this](const Acknowledgement& ack) { OnAck(ack); }) {}
 
   int Run(Recording* recording) {
-    Rig rig;
-    ActiveVersion active;
-    std::optional<LastSegment> last;
-    grpc::Status status = ReadRig(&rig);
-    if (status.ok()) status = ReadActive(&active);
-    if (status.ok()) status = FindLast(&last);
+    DeviceVersion active;
+    v1::Segment last;
+    grpc::Status status = ReadActive(&active);
+    if (status.ok()) {
+      status =
+          ReadNewestSegment(context_,
+                            options_.rig,
+                            fmt::format("session = \"{}\"", options_.session),
+                            &last);
+    }
     if (!status.ok()) return Fail(*context_, status);
-    if (rig.factory.cameras.size() != recording->cameras().size()) {
+    if (active.rig.factory.cameras.size() != recording->cameras().size()) {
       return FailInput(absl::InvalidArgumentError(
           fmt::format("the recording has {} cameras and the rig '{}' has {}; "
                       "name the topics of its cameras with --camera-topic, or "
                       "choose cameras of the calibration with --cameras",
                       recording->cameras().size(),
                       options_.rig,
-                      rig.factory.cameras.size())));
+                      active.rig.factory.cameras.size())));
     }
     OdometryOptions odometry{.session = options_.session,
                              .keyframe_rate_hz = options_.keyframe_rate_hz,
                              .keyframes = options_.keyframes};
-    if (last) {
+    if (const auto name = ParseSegmentName(last.name())) {
       counts_->continued = true;
       // Not joined to the segment before: its motion is not known here.
-      odometry.first_index = last->index + 2;
-      odometry.after_ns = last->end_ns;
+      odometry.first_index = name->key.index + 2;
+      odometry.after_ns = last.end_ns();
     }
-    Odometry source(recording, rig, active.theta, odometry);
+    Odometry source(recording, active.rig, active.theta, odometry);
     for (;;) {
-      auto next = source.Next(active.theta, active.version);
+      auto next = source.Next(active.theta, active.message.version());
       if (!next.ok()) return FailInput(next.status());
       if (!*next) break;
       Show(source.progress(), "");
@@ -128,44 +107,8 @@ class Feed {
                    fmt::format("images, {} segments{}", counts_->sent, note));
   }
 
-  grpc::Status ReadRig(Rig* rig) {
-    v1::Rig message;
-    const grpc::Status status = ReadDevice(context_, options_.rig, &message);
-    if (!status.ok()) return status;
-    const auto faults = FromProto(message, "rig", rig);
-    return faults.empty() ? grpc::Status::OK : Unreadable(faults);
-  }
-
-  grpc::Status ReadActive(ActiveVersion* active) {
-    v1::GetCalibrationRequest request;
-    request.set_name(ChildName(options_.rig, "calibrations", "active"));
-    v1::Calibration calibration;
-    const grpc::Status status =
-        Call<CalibrationService>(calibrations_.get(),
-                                 &CalibrationService::GetCalibration,
-                                 request,
-                                 &calibration);
-    if (!status.ok()) return status;
-    active->version = calibration.version();
-    const auto faults =
-        FromProto(calibration.parameters(), "parameters", &active->theta);
-    return faults.empty() ? grpc::Status::OK : Unreadable(faults);
-  }
-
-  grpc::Status FindLast(std::optional<LastSegment>* last) {
-    v1::ListSegmentsRequest request;
-    request.set_parent(RigName(options_.rig));
-    request.set_filter(fmt::format("session = \"{}\"", options_.session));
-    request.set_order_by("receive_time desc");
-    request.set_view(v1::ListSegmentsRequest::BASIC);
-    request.set_page_size(1);
-    v1::ListSegmentsResponse listed;
-    const grpc::Status status = Call<SegmentService>(
-        segments_.get(), &SegmentService::ListSegments, request, &listed);
-    if (!status.ok() || listed.segments().empty()) return status;
-    const auto name = ParseSegmentName(listed.segments(0).name());
-    if (name) *last = {name->key.index, listed.segments(0).end_ns()};
-    return status;
+  grpc::Status ReadActive(DeviceVersion* active) {
+    return ReadDeviceVersion(context_, options_.rig, "active", active);
   }
 
   // Sends a segment and waits for what the daemon does with it.
@@ -221,26 +164,17 @@ class Feed {
   }
 
   grpc::Status WaitForRun(const OdometryProgress& at) {
-    v1::ListRecalibrationsRequest request;
-    request.set_parent(RigName(options_.rig));
-    request.set_page_size(1);
     for (;;) {
-      v1::ListRecalibrationsResponse listed;
+      v1::Recalibration run;
       const grpc::Status status =
-          Call<RecalibrationService>(runs_.get(),
-                                     &RecalibrationService::ListRecalibrations,
-                                     request,
-                                     &listed);
-      if (!status.ok() || listed.recalibrations().empty() ||
-          !IsUnfinished(listed.recalibrations(0))) {
-        return status;
-      }
+          ReadNewestRun(runs_.get(), options_.rig, &run);
+      if (!status.ok() || run.name().empty() || HasEnded(run)) return status;
       Show(at, ", calibrating");
       std::this_thread::sleep_for(kPollEvery);
     }
   }
 
-  // On the thread of the stream.
+  // Called on the thread of the stream.
   void OnAck(const Acknowledgement& ack) {
     if (ack.verdict != Acknowledgement::Verdict::kRejected) return;
     const std::lock_guard lock(mutex_);
@@ -256,7 +190,6 @@ class Feed {
   const FeedOptions options_;
   FeedCounts* counts_;
   const std::unique_ptr<SegmentService> segments_;
-  const std::unique_ptr<CalibrationService> calibrations_;
   const std::unique_ptr<RecalibrationService> runs_;
   Progress progress_;
   std::mutex mutex_;

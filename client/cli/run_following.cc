@@ -23,12 +23,6 @@ using RecalibrationService = v1::RecalibrationService::StubInterface;
 constexpr std::chrono::seconds kPatience{60};
 constexpr std::chrono::milliseconds kReadEvery{500};
 
-bool HasEnded(const v1::Recalibration& run) {
-  return run.state() == v1::Recalibration::SUCCEEDED ||
-         run.state() == v1::Recalibration::FAILED ||
-         run.state() == v1::Recalibration::CANCELLED;
-}
-
 void ShowProgress(const v1::Recalibration& run, Progress* progress) {
   const auto iteration = static_cast<std::size_t>(std::max(run.iteration(), 0));
   const auto limit =
@@ -110,6 +104,27 @@ int ShowResult(Context* context, const v1::Recalibration& run) {
 }
 
 }  // namespace
+
+bool HasEnded(const v1::Recalibration& run) {
+  return run.state() == v1::Recalibration::SUCCEEDED ||
+         run.state() == v1::Recalibration::FAILED ||
+         run.state() == v1::Recalibration::CANCELLED;
+}
+
+grpc::Status ReadNewestRun(RecalibrationService* stub,
+                           const std::string& rig,
+                           v1::Recalibration* run) {
+  v1::ListRecalibrationsRequest request;
+  request.set_parent(RigName(rig));
+  request.set_page_size(1);
+  v1::ListRecalibrationsResponse listed;
+  const grpc::Status status = Call<RecalibrationService>(
+      stub, &RecalibrationService::ListRecalibrations, request, &listed);
+  if (status.ok() && !listed.recalibrations().empty()) {
+    *run = listed.recalibrations(0);
+  }
+  return status;
+}
 
 void PrintRun(const Context& context, const v1::Recalibration& run) {
   if (context.json) return context.PrintJson(run);

@@ -1,10 +1,19 @@
 // Shows a run on the command line and follows it to its end.
 #pragma once
 
+#include <string>
+
 #include "client/cli/context.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
 
 namespace selfcal::client {
+
+bool HasEnded(const v1::Recalibration& run);
+
+// Reads the newest run of a rig; it has no name if there is none.
+grpc::Status ReadNewestRun(v1::RecalibrationService::StubInterface* stub,
+                           const std::string& rig,
+                           v1::Recalibration* run);
 
 void PrintRun(const Context& context, const v1::Recalibration& run);
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "client/tracking/feature_tracker.h"
+#include "core/model/median.h"
 #include "core/motion/estimate_motion.h"
 
 namespace selfcal::client {
@@ -27,10 +28,8 @@ int KeyframeStep(const std::vector<ImageSet>& sets, double rate_hz) {
   for (std::size_t i = 1; i < sets.size(); ++i) {
     steps_ns.push_back(sets[i].t_ns - sets[i - 1].t_ns);
   }
-  const auto middle =
-      steps_ns.begin() + static_cast<std::ptrdiff_t>(steps_ns.size() / 2);
-  std::nth_element(steps_ns.begin(), middle, steps_ns.end());
-  const double step_s = 1e-9 * static_cast<double>(*middle);
+  const double step_s =
+      1e-9 * static_cast<double>(UpperMedian(std::move(steps_ns)));
   // A tenth of a step less: stamps jitter.
   return std::max(1, static_cast<int>(std::ceil(1 / (rate_hz * step_s) - 0.1)));
 }

@@ -43,12 +43,12 @@ struct OdometryOptions {
 
 struct OdometrySegment {
   MotionSegment segment;
-  // Why the motion was not found, as a clause; empty if it was.
+  // The reason why the motion was not found, a clause; empty if it was.
   std::string failure;
   double reprojection_rms_px = 0;
 };
 
-// How far the odometry is, for a progress bar.
+// Images that were read so far, for a progress bar.
 struct OdometryProgress {
   std::size_t images = 0;  // stamps, read
   std::size_t of = 0;

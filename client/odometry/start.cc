@@ -52,6 +52,7 @@ absl::StatusOr<std::vector<TrackedImage>> TracksOf(
 // Moves a camera to where its rotations agree with those of the gyroscope.
 absl::Status Turn(Recording* recording,
                   const UnknownOfCamera& unknown,
+                  bool offset_is_estimated,
                   int camera,
                   Calibration* theta) {
   CameraCalibration& moved = theta->cameras[camera];
@@ -73,8 +74,9 @@ absl::Status Turn(Recording* recording,
   if (unknown.rotation) moved.q_CI = start.q_CI;
   if (unknown.focal) moved.f *= start.focal_scale;
   const double change_s = std::abs(start.time_offset_s - moved.time_offset_s);
-  if (change_s >
-      std::max(kLeastOffset_s, kOffsetSigmas * start.Sigma(kStartTimeOffset))) {
+  if (offset_is_estimated &&
+      change_s > std::max(kLeastOffset_s,
+                          kOffsetSigmas * start.Sigma(kStartTimeOffset))) {
     moved.time_offset_s = start.time_offset_s;
   }
   return absl::OkStatus();
@@ -87,9 +89,13 @@ absl::StatusOr<CalibrationStart> FindStart(
     const Rig& given,
     const std::vector<UnknownOfCamera>& unknown) {
   Rig rig = given;
+  const std::vector<char> offsets = EstimatedTimeOffsets(rig);
   for (std::size_t j = 0; j < unknown.size(); ++j) {
-    const absl::Status turned =
-        Turn(recording, unknown[j], static_cast<int>(j), &rig.factory);
+    const absl::Status turned = Turn(recording,
+                                     unknown[j],
+                                     offsets[j] != 0,
+                                     static_cast<int>(j),
+                                     &rig.factory);
     if (!turned.ok()) return turned;
   }
   Odometry odometry(recording, rig, rig.factory, {.session = "start"});

@@ -12,7 +12,7 @@
 
 namespace selfcal::client {
 
-// What is unknown of a camera, beyond the tolerances of a rig.
+// Parts of a camera that are unknown, beyond the tolerances of a rig.
 struct UnknownOfCamera {
   bool rotation = false;  // q_CI may be any
   bool focal = false;     // f is a guess from the size of the image
@@ -32,10 +32,10 @@ struct CalibrationStart {
 // granted. Directions of theta that these segments do not show keep their
 // factory value.
 //
-// As a prior for a calibration on the same recording, with the tolerances of
-// the factory, the start makes sigmas too small by up to 12 %, in directions
-// about which the data says as much as the prior, and by nothing that matters
-// in all others.
+// The start, as a prior for a calibration on the same recording with the
+// tolerances of the factory, makes sigmas too small by up to 12 %, in
+// directions about which the data says as much as the prior, and by nothing
+// that matters in all others.
 //
 // `unknown` has an entry for each camera. NOT_FOUND with the reason if there is
 // no motion, the rotation of a camera is not found or the calibration does not

@@ -28,7 +28,7 @@ struct StoredMessage {
   MessagePlace place;
 };
 
-// What was found of one topic.
+// Messages that were found of one topic.
 struct ImageTopic {
   bool is_compressed = false;
   std::vector<std::int64_t> times_ns;

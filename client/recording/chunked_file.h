@@ -33,7 +33,7 @@ struct FileChunk {
 // decompressed. Not thread-safe.
 class ChunkedFile {
  public:
-  // Of the chunks, the last one is kept, and others up to `kept_bytes` with it.
+  // Chunks that are kept: the last one, and others up to `kept_bytes` with it.
   explicit ChunkedFile(std::unique_ptr<InputFile> file,
                        std::size_t kept_bytes = std::size_t{16} << 20);
 
@@ -44,7 +44,7 @@ class ChunkedFile {
   absl::StatusOr<std::shared_ptr<const std::string>> AddChunk(
       const FileChunk& chunk, std::int32_t* number);
 
-  // As MessageFile::Read.
+  // The same as MessageFile::Read.
   absl::StatusOr<std::string_view> Read(const MessagePlace& place,
                                         std::size_t max_size);
 

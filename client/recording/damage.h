@@ -1,4 +1,4 @@
-// What is damaged in a file of messages, as sentences.
+// Damaged parts of a file of messages, as sentences.
 #pragma once
 
 #include <absl/status/status.h>

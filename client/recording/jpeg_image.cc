@@ -12,7 +12,7 @@
 namespace selfcal::client {
 namespace {
 
-// Beyond these, a file of a few kB would take seconds or all memory.
+// Limits beyond which a file of a few kB would take seconds or all memory.
 constexpr int kMaxScans = 200;
 constexpr long kMaxWorkingBytes = 256L << 20;
 
@@ -22,7 +22,7 @@ std::string MessageOf(j_common_ptr jpeg) {
   return text;
 }
 
-// As with libpng, exceptions may pass the library's frames.
+// Exceptions may pass the library's frames, as with libpng.
 [[noreturn]] void ThrowError(j_common_ptr jpeg) {
   throw std::runtime_error(MessageOf(jpeg));
 }

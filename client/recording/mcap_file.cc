@@ -17,9 +17,10 @@ namespace {
 
 // Schemas contain the definition of a message, channels their metadata.
 constexpr std::uint64_t kMaxDefinitionBytes = 16 << 20;
-// Of a message before its data: channel, sequence, and two times.
+// Bytes of a message before its data: channel, sequence, and two times.
 constexpr std::uint64_t kMessageHeaderBytes = 2 + 4 + 8 + 8;
-// Of a chunk before the name of its compression: two times, size, checksum.
+// Bytes of a chunk before the name of its compression: two times, size,
+// checksum.
 constexpr std::uint64_t kChunkHeaderBytes = 8 + 8 + 8 + 4;
 
 // Opcode and size of any record.

@@ -31,7 +31,7 @@ struct MessageTopic {
 // "sensor_msgs/msg/Image".
 std::string RosTypeName(std::string_view type);
 
-// Where a message lies: in a compressed chunk, or -1 for the file; the
+// The place of a message: in a compressed chunk, or -1 for the file; the
 // container knows what the offset means.
 struct MessagePlace {
   std::int32_t chunk = -1;

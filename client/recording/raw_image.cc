@@ -87,7 +87,7 @@ class Samples {
     return static_cast<std::uint8_t>(
         image_.data[Place(u, v) + static_cast<std::size_t>(offset)]);
   }
-  // Of one or two bytes, in the full range of 16 bits.
+  // Values of one or two bytes, in the full range of 16 bits.
   std::uint32_t At(int u, int v) const {
     if (encoding_.sample_bytes == 1) return At8(u, v, 0);
     const std::uint32_t first = At8(u, v, 0);

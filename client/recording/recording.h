@@ -29,7 +29,7 @@ struct RecordedCamera {
   std::string name;  // "cam0"
   // Stamps of the images, each later than the one before.
   std::vector<std::int64_t> image_times_ns;
-  // What the recording states about the camera, if it does.
+  // The calibration that the recording states, if it does.
   std::optional<CameraCalibration> calibration;
   // False if the recording states no pose: that of `calibration` is the
   // identity.
@@ -51,7 +51,7 @@ class Recording {
 
   const std::vector<RecordedCamera>& cameras() const { return data_.cameras; }
   const std::vector<ImuSample>& imu() const { return data_.imu; }
-  // What was left out or repaired: a sentence each.
+  // Parts that were left out or repaired: a sentence each.
   const std::vector<std::string>& problems() const { return data_.problems; }
 
   // Reads an image by its index in image_times_ns of a camera. DATA_LOSS with
@@ -62,8 +62,8 @@ class Recording {
  protected:
   explicit Recording(RecordedData data) : data_(std::move(data)) {}
 
-  // What ReadImage returns of pixels that were read from `where`: an error with
-  // that name, also if camera j has a calibration for another size.
+  // The result of ReadImage for pixels that were read from `where`: an error
+  // with that name, also if camera j has a calibration for another size.
   absl::StatusOr<GreyPixels> Checked(absl::StatusOr<GreyPixels> pixels,
                                      const std::string& where,
                                      int j) const;

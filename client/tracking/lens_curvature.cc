@@ -16,7 +16,7 @@ LensCurvature CurvatureAt(const CameraCalibration& camera,
   if (!Unproject(camera, z_px, &axis)) return LensCurvature::Zero();
   const Eigen::Vector3d first = axis.unitOrthogonal();
   const Eigen::Vector3d second = axis.cross(first);
-  // Where the rays of the neighbours meet the plane.
+  // The places at which the rays of the neighbours meet the plane.
   Eigen::Vector2d u[3][3];
   for (int i = -1; i <= 1; ++i) {
     for (int j = -1; j <= 1; ++j) {

@@ -1,5 +1,5 @@
-// How a lens bends a patch of an image: the second order of the map from pixels
-// to the plane across the ray of the patch.
+// The bending of a patch of an image by the lens: the second order of the map
+// from pixels to the plane across the ray of the patch.
 //
 // Pure functions, callable from any thread.
 #pragma once
@@ -14,7 +14,7 @@ namespace selfcal::client {
 // without curvature would see x + C (x_0^2, x_0 x_1, x_1^2)^T.
 using LensCurvature = Eigen::Matrix<double, 2, 3>;
 
-// At a pixel. Zero where the model has no rays about it.
+// The curvature at a pixel. Zero where the model has no rays about it.
 LensCurvature CurvatureAt(const CameraCalibration& camera,
                           const Eigen::Vector2d& z_px);
 

@@ -78,16 +78,8 @@ class Bends {
     ApplyStep(linearised_, step_d, &estimate, &landmarks);
     SolverRound round = round_;
     round.max_iterations = kMaxIterations;
-    double last = 0;
-    const SolverOutcome outcome = SolveRoundByStructure(
-        round,
-        [&](int iteration, double cost, const Eigen::VectorXd&) {
-          const bool enough = iteration > 0 && last - cost < kEnough;
-          last = cost;
-          return enough ? SolverSignal::kEnough : SolverSignal::kGoOn;
-        },
-        &estimate,
-        &landmarks);
+    const SolverOutcome outcome =
+        SolveRoundByStructure(round, EndBelow(kEnough), &estimate, &landmarks);
     if (outcome.status != SolverStatus::kConverged) return std::nullopt;
     return estimate.d;
   }

@@ -1,5 +1,5 @@
-// What directions that are held constant do to the estimated ones beyond the
-// first order.
+// The effect of directions that are held constant on the estimated ones beyond
+// the first order.
 //
 // A direction is held although the data observe it if the problem is not linear
 // within its sigma (linear_range.h): as for a unified camera, whose xi, focal

@@ -39,16 +39,8 @@ constexpr double kGaugeInformation = 1;
 std::optional<SolverOutcome> Settle(const SolverRound& round,
                                     CalibrationEstimate* estimate,
                                     std::vector<ScreenedLandmark>* landmarks) {
-  double last = 0;
-  const SolverOutcome outcome = SolveRoundByStructure(
-      round,
-      [&](int iteration, double cost, const Eigen::VectorXd&) {
-        const bool enough = iteration > 0 && last - cost < kEnough;
-        last = cost;
-        return enough ? SolverSignal::kEnough : SolverSignal::kGoOn;
-      },
-      estimate,
-      landmarks);
+  const SolverOutcome outcome =
+      SolveRoundByStructure(round, EndBelow(kEnough), estimate, landmarks);
   if (outcome.status == SolverStatus::kFailed) return std::nullopt;
   return outcome;
 }

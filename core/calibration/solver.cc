@@ -5,6 +5,15 @@
 
 namespace selfcal {
 
+SolverCallback EndBelow(double least) {
+  return [least, last = 0.0](
+             int iteration, double cost, const Eigen::VectorXd&) mutable {
+    const bool enough = iteration > 0 && last - cost < least;
+    last = cost;
+    return enough ? SolverSignal::kEnough : SolverSignal::kGoOn;
+  };
+}
+
 SolverOutcome SolveRound(SolverKind kind,
                          const SolverRound& round,
                          const SolverCallback& callback,

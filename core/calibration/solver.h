@@ -58,6 +58,10 @@ enum class SolverSignal {
 using SolverCallback = std::function<SolverSignal(
     int iteration, double cost, const Eigen::VectorXd& d)>;
 
+// Ends a round once an iteration reduces the cost by less than `least` [half
+// squares].
+SolverCallback EndBelow(double least);
+
 // Improves the estimate and the positions of the landmarks. If it fails or is
 // cancelled, both are those of the last accepted step.
 SolverOutcome SolveRound(SolverKind kind,

@@ -104,7 +104,7 @@ struct RowPoses {
   }
 };
 
-// Without a rolling shutter all rows have the pose of the run.
+// All rows have the pose of the run if the shutter is not a rolling one.
 struct RunPose {
   RunPose(const RunGeometry&, const Batch&) {}
   const Vector3& ToRows(const Vector3& p_run, T) const { return p_run; }

@@ -43,7 +43,7 @@ class RayImages {
 
   const std::vector<RayImage>& images() const { return images_; }
   const CameraCalibration& camera() const { return camera_; }
-  // With the focal scale [px/rad].
+  // Includes the focal scale [px/rad].
   double px_per_rad() const;
 
  private:

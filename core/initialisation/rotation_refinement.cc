@@ -190,7 +190,7 @@ class Refiner {
     return std::max(kLeastScale_px, kSigmas * RobustSigma());
   }
 
-  // With Geman-McClure weights; or, for a covariance, with the second
+  // Uses Geman-McClure weights; or, for a covariance, with the second
   // derivatives of that loss, but for the elimination of the direction, which
   // they may leave undetermined.
   Equations PairEquations(std::size_t k,
@@ -246,7 +246,7 @@ class Refiner {
 
   // Returns the length of the step in sigmas.
   double Step(double scale_px) {
-    // As if all residuals below the scale were noise.
+    // Treated as if all residuals below the scale were noise.
     const double variance = std::pow(scale_px / kSigmas, 2);
     const Vector8 prior = variance * PriorInformation();
     Matrix8 H = prior.asDiagonal();

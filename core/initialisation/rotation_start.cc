@@ -116,7 +116,8 @@ class Finder {
   }
 
  private:
-  // Why there is no start at these offsets; empty if there is one at the first.
+  // The reason why there is no start at these offsets; empty if there is one at
+  // the first.
   std::string Objection(const std::vector<TurnAlignment>& minima) const {
     const TurnAlignment& best = minima.front();
     if (best.turns < kMinPairs) {
@@ -244,7 +245,7 @@ class Finder {
     return prior;
   }
 
-  // Why a result is none; empty if it is one.
+  // The reason why a result is none; empty if it is one.
   std::string Objection(const RotationStart& start) const {
     double rotation = 0, bias = 0;
     for (int i = 0; i < 3; ++i) {

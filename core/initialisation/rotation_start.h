@@ -49,7 +49,7 @@ struct RotationSearch {
   double rotation_sigma_rad = 0.17;
   // Range of the time offset about that of the camera, of either sign.
   double max_time_offset_s = 0.15;
-  // Whether f of the camera is a guess, whose logarithm is right within
+  // True if f of the camera is a guess, whose logarithm is right within
   // focal_sigma.
   bool estimate_focal_scale = false;
   double focal_sigma = 0.3;
@@ -67,10 +67,10 @@ struct RotationStart {
   double time_offset_s = 0;                       // as of CameraCalibration
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();  // [rad/s], mean, in I
   double focal_scale = 1;  // f is that of the camera times this
-  // In rad, s, rad/s and 1; zero for a focal scale that is not estimated. It is
-  // that of the scatter of the pairs of images, not of a stated noise; with
-  // outliers or errors that are correlated along tracks, sigmas are too small
-  // by about a seventh.
+  // Units are rad, s, rad/s and 1; zero for a focal scale that is not
+  // estimated. It is that of the scatter of the pairs of images, not of a
+  // stated noise; with outliers or errors that are correlated along tracks,
+  // sigmas are too small by about a seventh.
   Eigen::Matrix<double, kStartSize, kStartSize> covariance =
       Eigen::Matrix<double, kStartSize, kStartSize>::Zero();
   // Share of the mean square of the camera's rotations that the gyroscope

@@ -1,7 +1,7 @@
 // States of keyframes and landmarks from tracks and readings alone, by linear
 // least squares: the start of estimate_motion.h.
 //
-// With the rotations of the gyroscope, a landmark p_B, the centre o_B of the
+// Given the rotations of the gyroscope, a landmark p_B, the centre o_B of the
 // camera that observes it and its ray u_B satisfy u_B x (p_B - o_B) = 0, and
 // o_B is linear in the unknowns of the path (exposure_path.h). Landmarks are
 // eliminated; nine unknowns remain. Distances, by which these rows are divided,
@@ -23,7 +23,7 @@
 
 namespace selfcal {
 
-// What is known about the first keyframe before the segment is looked at.
+// Knowledge of the first keyframe from before the segment.
 struct MotionStart {
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();  // [m/s^2], in A
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();  // [rad/s], in I

@@ -50,10 +50,10 @@ bool Descend(WorkingPoint* point) {
 }
 
 // Least scale of the cameras [px/rad].
-double PixelsPerRadian(const Calibration& theta) {
+double LeastScale(const Calibration& theta) {
   double least = std::numeric_limits<double>::infinity();
   for (const CameraCalibration& camera : theta.cameras) {
-    least = std::min(least, selfcal::PixelsPerRadian(camera).minCoeff());
+    least = std::min(least, PixelsPerRadian(camera).minCoeff());
   }
   return least;
 }
@@ -101,8 +101,7 @@ MotionEstimate EstimateMotion(const Rig& rig,
   if (result.landmarks < kMinLandmarks) {
     result.failure = "too few landmarks have parallax";
   } else if (result.used < kMinUsed * result.observations ||
-             result.reprojection_rms_px >
-                 kMaxRms_rad * PixelsPerRadian(theta)) {
+             result.reprojection_rms_px > kMaxRms_rad * LeastScale(theta)) {
     result.failure = "most of the tracks do not agree with one motion";
   }
   Store(point, segment);

@@ -41,9 +41,9 @@ std::optional<TimeOffset> EstimateTimeOffset(
 // look like a SLAM system's own delays.
 inline constexpr double kLeastTimeOffset_s = 5e-3;
 
-// Whether a calibration explains states that hold this much later than their
-// stamps: those of the IMU's clock, or of the first or the middle row of the
-// images of a camera.
+// Returns whether a calibration explains states that hold this much later than
+// their stamps: those of the IMU's clock, or of the first or the middle row of
+// the images of a camera.
 bool IsStatedOffset(const Calibration& theta,
                     double offset_s,
                     double tolerance_s);

@@ -73,7 +73,7 @@ TEST_F(Chunks, OnlyTheLastOnesAreKept) {
   const auto file = Open(2 * kSize);
   EXPECT_EQ(Read(file.get(), 2), "ccc");
   EXPECT_EQ(Read(file.get(), 0), "aaa");
-  // What is not kept cannot be read from now on.
+  // Chunks that are not kept cannot be read from now on.
   std::filesystem::resize_file(path_, 0);
   EXPECT_EQ(Read(file.get(), 0), "aaa");
   EXPECT_EQ(Read(file.get(), 2), "ccc");

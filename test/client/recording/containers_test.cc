@@ -94,7 +94,7 @@ TEST_P(Container, HasTheSameBits) {
   EXPECT_THAT((*recording)->problems(), IsEmpty());
   ExpectTrueReadings(**recording);
   ExpectTrueImages(recording->get());
-  // From the last one to the first, too.
+  // Backwards, too: from the last one to the first.
   for (int k = kImages; k-- > 0;) {
     EXPECT_EQ((*recording)->ReadImage(1, k)->pixels, TruePixels(1, k));
   }

@@ -45,7 +45,7 @@ std::vector<std::uint8_t> Converted(const RosImage& image) {
   return pixels.ok() ? pixels->pixels : std::vector<std::uint8_t>();
 }
 
-// What a PNG of these pixels is read as.
+// Reads a PNG of these pixels.
 std::vector<std::uint8_t> AsPng(const std::string& data,
                                 int width,
                                 int height,

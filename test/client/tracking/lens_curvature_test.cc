@@ -12,7 +12,7 @@
 namespace selfcal::client {
 namespace {
 
-// Where a rotation of the camera takes a pixel.
+// The pixel to which a rotation of the camera takes another.
 std::optional<Eigen::Vector2d> Turned(const CameraCalibration& camera,
                                       const Eigen::Quaterniond& q,
                                       const Eigen::Vector2d& z_px) {

@@ -1,4 +1,4 @@
-// From rendered images to a start, without the gyroscope's predictions, which
+// A start from rendered images, without the gyroscope's predictions, which
 // need a rotation and a time offset that nobody knows yet.
 
 #include <gtest/gtest.h>

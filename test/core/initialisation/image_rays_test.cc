@@ -101,7 +101,7 @@ TEST(ChainPairs, GoesOnUntilPointsHaveMovedAsLongAsHalfOfThemAreCommon) {
   ASSERT_FALSE(pairs.empty());
   EXPECT_GE(pairs[0].to, 4);
   EXPECT_LE(pairs[0].to, 8);
-  // Of 40 points half are left after 20 images, but half a second has 10.
+  // Half of 40 points are left after 20 images, but half a second has 10.
   const RayImages still(Pinhole(), MovingPoints(31, 0), 0);
   EXPECT_EQ(ChainPairs(still.images(), 0.06, 1.0)[0].to, 10);
 }

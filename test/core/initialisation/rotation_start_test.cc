@@ -71,7 +71,8 @@ RotationStartResult Find(const Recording& recording,
                            options);
 }
 
-// In the middle of the image, of the focal length of a start by the true one.
+// Ratio, in the middle of the image, of the focal length of a start by the true
+// one.
 double FocalRatio(const Recording& recording,
                   const CameraCalibration& guess,
                   const RotationStart& start) {
@@ -279,7 +280,7 @@ TEST(FindRotationStart, ARotationThatIsWrongByTenDegreesIsRefined) {
   }
 }
 
-// Without parallax, noise in the directions of translation would move q_CI by
+// Noise without parallax in the directions of translation would move q_CI by
 // 5.6 mrad, root mean square over these seeds, and the focal length by 1.6 %.
 TEST(FindRotationStart, IsAccurateForARotationInPlace) {
   constexpr int kSeeds = 8;
