@@ -67,6 +67,7 @@ absl::StatusOr<Stated> StatedBy(Recording* recording,
                                 DistortionModel guessed,
                                 std::vector<Loss>* losses) {
   Stated stated;
+  if (recording->imu_noise()) stated.rig.imu_noise = *recording->imu_noise();
   for (std::size_t j = 0; j < recording->cameras().size(); ++j) {
     const RecordedCamera& camera = recording->cameras()[j];
     const bool given = std::any_of(

@@ -66,6 +66,9 @@ absl::StatusOr<std::vector<RecordedSession>> OpenSessions(
     for (const std::string& problem : (*recording)->problems()) {
       PrintError(problem);
     }
+    if (const auto differences = StampDifferences(**recording)) {
+      PrintError(fmt::format("{}: {}", path, *differences));
+    }
     const std::string name = fmt::format(
         "{}-{}",
         NameOf(path),

@@ -1,7 +1,8 @@
 // Visual-inertial odometry of a recording: images and readings to motion
 // segments, one after the other, as the daemon takes them.
 //
-// Tracks are followed through all images (client/tracking); every n-th image is
+// Tracks are followed through all images (client/tracking), or are those of a
+// recording that has tracks instead of images; every n-th image is
 // a keyframe; the motion of each segment is estimated with the calibration that
 // the caller passes (core/motion), from where the segment before it ended.
 // There is no map: a landmark lives as long as its track. A segment whose

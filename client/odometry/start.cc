@@ -23,8 +23,8 @@ constexpr double kSeconds = 20;
 constexpr double kLeastOffset_s = 5e-3;
 constexpr double kOffsetSigmas = 3;
 
-// Tracks of one camera, followed by its images alone: the gyroscope does not
-// help before it is known where the camera looks.
+// Tracks of one camera: those of the recording, or followed by its images
+// alone: the gyroscope does not help before it is known where the camera looks.
 absl::StatusOr<std::vector<TrackedImage>> TracksOf(
     Recording* recording, const CameraCalibration& theta, int camera) {
   Calibration alone;
@@ -35,6 +35,14 @@ absl::StatusOr<std::vector<TrackedImage>> TracksOf(
       recording->cameras()[camera].image_times_ns;
   for (std::size_t i = 0; i < times_ns.size(); ++i) {
     if (1e-9 * static_cast<double>(times_ns[i] - times_ns[0]) > kSeconds) break;
+    if (const auto* points = recording->Points(camera, static_cast<int>(i))) {
+      TrackedImage& recorded = images.emplace_back();
+      recorded.t_ns = times_ns[i];
+      for (const RecordedPoint& point : *points) {
+        recorded.points.push_back({point.landmark, point.z_px});
+      }
+      continue;
+    }
     auto pixels = recording->ReadImage(camera, static_cast<int>(i));
     if (!pixels.ok()) continue;
     const cv::Mat image(

@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "client/recording/order_of_time.h"
+#include "core/model/calibration.h"
 
 namespace selfcal::client {
 namespace {
@@ -170,6 +171,36 @@ absl::StatusOr<std::vector<ImuSample>> ReadImuCsv(
   if (!read.ok()) return read;
   SortByTime(path.string(), &imu, problems);
   return imu;
+}
+
+absl::StatusOr<std::vector<ListedPoint>> ReadTrackCsv(const fs::path& path) {
+  std::vector<ListedPoint> points;
+  const absl::Status read = ReadList(
+      path, 5, [&](std::int64_t t_ns, const Cells& cells) -> std::string {
+        ListedPoint listed;
+        listed.t_ns = t_ns;
+        if (!ParseNumber(cells[1], &listed.camera) || listed.camera < 0 ||
+            listed.camera >= kMaxCameras) {
+          return fmt::format("the camera '{}' is not a number from 0 to {}",
+                             cells[1].substr(0, 40),
+                             kMaxCameras - 1);
+        }
+        if (!ParseNumber(cells[2], &listed.point.landmark)) {
+          return fmt::format("the landmark '{}' is not a whole number",
+                             cells[2].substr(0, 40));
+        }
+        for (int i = 0; i < 2; ++i) {
+          double& z = listed.point.z_px[i];
+          if (!ParseNumber(cells[3 + i], &z) || !std::isfinite(z)) {
+            return fmt::format("the pixel '{}' is not a finite number",
+                               cells[3 + i].substr(0, 40));
+          }
+        }
+        points.push_back(listed);
+        return {};
+      });
+  if (!read.ok()) return read;
+  return points;
 }
 
 }  // namespace selfcal::client

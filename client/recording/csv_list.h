@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "client/recording/recording.h"
 #include "core/model/segment.h"
 
 namespace selfcal::client {
@@ -32,5 +33,15 @@ absl::StatusOr<ListedImages> ReadImageCsv(const std::filesystem::path& path,
 // Reads lines "time, gyroscope x y z [rad/s], accelerometer x y z [m/s^2]".
 absl::StatusOr<std::vector<ImuSample>> ReadImuCsv(
     const std::filesystem::path& path, std::vector<std::string>* problems);
+
+struct ListedPoint {
+  std::int64_t t_ns = 0;
+  int camera = 0;
+  RecordedPoint point;
+};
+
+// Reads lines "time, camera, landmark, x, y [px]", in the order of the file.
+absl::StatusOr<std::vector<ListedPoint>> ReadTrackCsv(
+    const std::filesystem::path& path);
 
 }  // namespace selfcal::client

@@ -3,9 +3,11 @@
 #include <absl/status/status.h>
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -30,6 +32,23 @@ fs::path RootOf(const std::string& folder) {
   return IsFolder(mav) ? mav : fs::path(folder);
 }
 
+// What the sensor.yaml of a folder states; nullopt if there is none.
+template <class Stated>
+absl::StatusOr<std::optional<Stated>> ReadSensor(
+    const fs::path& folder,
+    absl::StatusOr<Stated> (*parse)(const std::string&)) {
+  const fs::path yaml = folder / "sensor.yaml";
+  std::error_code error;
+  if (!fs::exists(yaml, error)) return std::optional<Stated>();
+  std::ifstream file(yaml);
+  auto parsed = parse({std::istreambuf_iterator<char>(file), {}});
+  if (!parsed.ok()) {
+    return absl::InvalidArgumentError(fmt::format(
+        "{}: {}", yaml.string(), std::string(parsed.status().message())));
+  }
+  return std::optional<Stated>(*std::move(parsed));
+}
+
 absl::Status AddCamera(const fs::path& folder,
                        RecordedData* data,
                        ImagePaths* paths) {
@@ -40,19 +59,30 @@ absl::Status AddCamera(const fs::path& folder,
   camera.name = folder.filename();
   camera.image_times_ns = std::move(listed->times_ns);
   paths->push_back(std::move(listed->paths));
-  const fs::path yaml = folder / "sensor.yaml";
-  std::error_code error;
-  if (fs::exists(yaml, error)) {
-    std::ifstream file(yaml);
-    auto parsed = ParseCameraYaml({std::istreambuf_iterator<char>(file), {}});
-    if (!parsed.ok()) {
-      return absl::InvalidArgumentError(fmt::format(
-          "{}: {}", yaml.string(), std::string(parsed.status().message())));
-    }
-    camera.calibration = *parsed;
-    camera.has_pose = true;
-  }
+  const auto stated = ReadSensor(folder, &ParseCameraYaml);
+  if (!stated.ok()) return stated.status();
+  camera.calibration = *stated;
+  camera.has_pose = stated->has_value();
   data->cameras.push_back(std::move(camera));
+  return absl::OkStatus();
+}
+
+// Poses of cameras are relative to the body until here.
+absl::Status DescribeImu(const fs::path& folder, RecordedData* data) {
+  const auto stated = ReadSensor(folder, &ParseImuYaml);
+  if (!stated.ok()) return stated.status();
+  if (!stated->has_value()) return absl::OkStatus();
+  const ImuYaml& imu = **stated;
+  data->imu_noise = imu.noise;
+  if (imu.T_BI.matrix().isIdentity(0)) return absl::OkStatus();
+  const Eigen::Quaterniond q_BI =
+      Eigen::Quaterniond(imu.T_BI.linear()).normalized();
+  for (RecordedCamera& camera : data->cameras) {
+    if (!camera.calibration) continue;
+    CameraCalibration& c = *camera.calibration;
+    c.p_CI += c.q_CI * imu.T_BI.translation();
+    c.q_CI = (c.q_CI * q_BI).normalized();
+  }
   return absl::OkStatus();
 }
 
@@ -80,6 +110,8 @@ absl::StatusOr<std::unique_ptr<Recording>> OpenEurocFolder(
   auto imu = ReadImuCsv(root / "imu0" / "data.csv", &data.problems);
   if (!imu.ok()) return imu.status();
   data.imu = *std::move(imu);
+  const absl::Status described = DescribeImu(root / "imu0", &data);
+  if (!described.ok()) return described;
   return std::make_unique<ImageFileRecording>(std::move(data),
                                               std::move(paths));
 }

@@ -2,6 +2,7 @@
 //
 //   folder of EuRoC's format (Burri et al. 2016), TUM-VI's included
 //   folder of images with cam0.csv, cam1.csv, ... and imu.csv
+//   folder of tracks, without images, with tracks.csv and imu.csv
 //   bag of ROS 1
 //   bag of ROS 2, in MCAP or SQLite: a file, or the folder with metadata.yaml
 //
@@ -12,6 +13,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -21,6 +23,7 @@
 
 #include "client/recording/grey_pixels.h"
 #include "core/model/camera.h"
+#include "core/model/rig.h"
 #include "core/model/segment.h"
 
 namespace selfcal::client {
@@ -36,9 +39,16 @@ struct RecordedCamera {
   bool has_pose = false;
 };
 
+// A point of the scene in an image.
+struct RecordedPoint {
+  std::uint64_t landmark = 0;  // the same in all images and cameras
+  Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
+};
+
 struct RecordedData {
   std::vector<RecordedCamera> cameras;  // at least one, each with an image
   std::vector<ImuSample> imu;  // each later than the one before; at least one
+  std::optional<ImuNoise> imu_noise;  // that the recording states, if it does
   std::vector<std::string> problems;
 };
 
@@ -51,6 +61,7 @@ class Recording {
 
   const std::vector<RecordedCamera>& cameras() const { return data_.cameras; }
   const std::vector<ImuSample>& imu() const { return data_.imu; }
+  const std::optional<ImuNoise>& imu_noise() const { return data_.imu_noise; }
   // Parts that were left out or repaired: a sentence each.
   const std::vector<std::string>& problems() const { return data_.problems; }
 
@@ -58,6 +69,13 @@ class Recording {
   // the file for one that is damaged or, if the camera has a calibration, of
   // another size; NOT_FOUND for a file that is gone.
   virtual absl::StatusOr<GreyPixels> ReadImage(int camera, int image) = 0;
+
+  // The points of an image, by landmark, of a recording that has tracks instead
+  // of images; null for one with images.
+  virtual const std::vector<RecordedPoint>* Points(int /*camera*/,
+                                                   int /*image*/) const {
+    return nullptr;
+  }
 
  protected:
   explicit Recording(RecordedData data) : data_(std::move(data)) {}
@@ -72,14 +90,21 @@ class Recording {
   const RecordedData data_;
 };
 
-// Images with the same timestamp: for each camera the index of its image, or
-// -1.
+// Images of one time: for each camera the index of its image, or -1. The stamp
+// is that of the earliest.
 struct ImageSet {
   std::int64_t t_ns = 0;
   std::vector<int> images;
 };
+// Drivers stamp the images of cameras that are exposed together one after the
+// other: images no further apart than this, of different cameras, are a set.
+inline constexpr double kSameTime_s = 2e-3;
 // All images, in order of time.
 std::vector<ImageSet> ImageSets(const Recording& recording);
+
+// By how much the stamps within a set differ, in one sentence for people, for a
+// recording in which any do.
+std::optional<std::string> StampDifferences(const Recording& recording);
 
 // Topics of a bag. Those that are not stated are found by their types: each
 // topic of images is a camera, in the order of their names.

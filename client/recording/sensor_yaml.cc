@@ -7,8 +7,9 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
-#include <optional>
+#include <cstddef>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "core/model/camera_model.h"
@@ -47,22 +48,26 @@ DistortionModel ModelNamed(const std::string& name) {
   throw std::runtime_error("distortion_model '" + name + "' is not known");
 }
 
-CameraCalibration Parse(const YAML::Node& yaml) {
-  CameraCalibration camera;
+// Takes a point from the sensor to the body.
+Eigen::Isometry3d PoseInBody(const YAML::Node& yaml) {
   const auto T_BS = Numbers(yaml["T_BS"]["data"], "T_BS", 16);
-  Eigen::Matrix3d R_IC;
-  Eigen::Vector3d p_IC;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) R_IC(i, j) = T_BS[4 * i + j];
-    p_IC[i] = T_BS[4 * i + 3];
+    for (int j = 0; j < 4; ++j) pose.matrix()(i, j) = T_BS[4 * i + j];
   }
-  const double off =
-      (R_IC * R_IC.transpose() - Eigen::Matrix3d::Identity()).norm();
-  if (off > kRotationTolerance || R_IC.determinant() < 0) {
+  const Eigen::Matrix3d R = pose.linear();
+  const double off = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm();
+  if (off > kRotationTolerance || R.determinant() < 0) {
     throw std::runtime_error("T_BS is not a rotation with a translation");
   }
-  camera.q_CI = Eigen::Quaterniond(R_IC).normalized().conjugate();
-  camera.p_CI = -(camera.q_CI * p_IC);
+  return pose;
+}
+
+CameraCalibration ParseCamera(const YAML::Node& yaml) {
+  CameraCalibration camera;
+  const Eigen::Isometry3d T_BC = PoseInBody(yaml);
+  camera.q_CI = Eigen::Quaterniond(T_BC.linear()).normalized().conjugate();
+  camera.p_CI = -(camera.q_CI * T_BC.translation());
   const auto f_c = Numbers(yaml["intrinsics"], "intrinsics", 4);
   camera.f = {f_c[0], f_c[1]};
   camera.c = {f_c[2], f_c[3]};
@@ -83,9 +88,34 @@ CameraCalibration Parse(const YAML::Node& yaml) {
   return camera;
 }
 
-}  // namespace
+ImuYaml ParseImu(const YAML::Node& yaml) {
+  ImuYaml imu;
+  if (yaml["T_BS"]) imu.T_BI = PoseInBody(yaml);
+  ImuNoise noise;
+  const std::pair<const char*, double*> densities[] = {
+      {"gyroscope_noise_density", &noise.gyro_noise_density},
+      {"accelerometer_noise_density", &noise.accel_noise_density},
+      {"gyroscope_random_walk", &noise.gyro_bias_random_walk},
+      {"accelerometer_random_walk", &noise.accel_bias_random_walk}};
+  bool all = true;
+  for (const auto& [key, value] : densities) {
+    if (!yaml[key]) {
+      all = false;
+      continue;
+    }
+    *value = yaml[key].as<double>();
+    if (!(*value > 0) || !std::isfinite(*value)) {
+      throw std::runtime_error(std::string(key) + " is not positive");
+    }
+  }
+  if (all) imu.noise = noise;
+  return imu;
+}
 
-absl::StatusOr<CameraCalibration> ParseCameraYaml(const std::string& text) {
+// parse(map) for the text of a file; its errors are those of the file.
+template <class Parsed>
+absl::StatusOr<Parsed> ParseText(const std::string& text,
+                                 Parsed (*parse)(const YAML::Node&)) {
   // OpenCV's header is no directive of YAML.
   const std::size_t begin =
       text.starts_with("%YAML:") ? text.find('\n') : std::size_t{0};
@@ -95,10 +125,20 @@ absl::StatusOr<CameraCalibration> ParseCameraYaml(const std::string& text) {
   try {
     const YAML::Node yaml = YAML::Load(text.substr(begin));
     if (!yaml.IsMap()) return absl::InvalidArgumentError("is not a map");
-    return Parse(yaml);
+    return parse(yaml);
   } catch (const std::exception& e) {
     return absl::InvalidArgumentError(e.what());
   }
+}
+
+}  // namespace
+
+absl::StatusOr<CameraCalibration> ParseCameraYaml(const std::string& text) {
+  return ParseText(text, &ParseCamera);
+}
+
+absl::StatusOr<ImuYaml> ParseImuYaml(const std::string& text) {
+  return ParseText(text, &ParseImu);
 }
 
 }  // namespace selfcal::client

@@ -335,7 +335,7 @@ TEST_F(BrokenBag, OtherFilesAreNoRecordings) {
   EXPECT_EQ(Error(folder_.path()),
             folder_.path().string() +
                 ": not a recording: the folder has neither mav0 nor cam0.csv "
-                "nor a bag");
+                "nor tracks.csv nor a bag");
   for (const std::string bytes : {"", "#ROSBAG", "timestamp,gyro\n1,2\n"}) {
     EXPECT_EQ(Error(Write("file", bytes)),
               folder_.File("file") +

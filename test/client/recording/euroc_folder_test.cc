@@ -137,6 +137,55 @@ TEST_F(EurocReader, ImagesOfOneTimeBelongTogether) {
   EXPECT_EQ(sets[2].images, std::vector<int>({2, 1}));
 }
 
+// The second camera is stamped later, by less in one image than in another.
+TEST_F(EurocReader, ImagesOfNearlyOneTimeBelongTogether) {
+  const fs::path list = Copy() / "cam1" / "data.csv";
+  std::string text = "#timestamp,filename\n";
+  for (int k = 0; k < rendered_->images(); ++k) {
+    const std::int64_t late_ns = k % 2 == 0 ? 300'000 : 1'900'000;
+    text += std::to_string(kEurocEpoch_ns + rendered_->stamp_ns(k) + late_ns) +
+            "," + Stamp(k) + ".png\n";
+  }
+  WriteBytes(list, text);
+  const auto recording = OpenRecording(copy_.path(), {});
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  const std::vector<ImageSet> sets = ImageSets(**recording);
+  ASSERT_EQ(sets.size(), rendered_->images());
+  for (int k = 0; k < rendered_->images(); ++k) {
+    EXPECT_EQ(sets[k].images, std::vector<int>({k, k}));
+    EXPECT_EQ(sets[k].t_ns, kEurocEpoch_ns + rendered_->stamp_ns(k));
+  }
+  const auto differences = StampDifferences(**recording);
+  ASSERT_TRUE(differences);
+  EXPECT_THAT(*differences, testing::HasSubstr("at most 1.900 ms"));
+  const auto whole = OpenRecording(whole_->path(), {});
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  EXPECT_FALSE(StampDifferences(**whole));
+}
+
+TEST_F(EurocReader, StatesTheNoiseOfTheImuAndItsPlaceInTheBody) {
+  const auto whole = OpenRecording(whole_->path(), {});
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  ASSERT_TRUE((*whole)->imu_noise());
+  EXPECT_EQ((*whole)->imu_noise()->gyro_noise_density,
+            rendered_->rig().imu_noise.gyro_noise_density);
+  // A body that is turned about z and shifted: the cameras are the same in I.
+  const fs::path folder = Copy();
+  WriteBytes(folder / "imu0" / "sensor.yaml",
+             "T_BS:\n  data: [0.0, -1.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.2,\n"
+             "         0.0, 0.0, 1.0, 0.3, 0.0, 0.0, 0.0, 1.0]\n");
+  const auto moved = OpenRecording(copy_.path(), {});
+  ASSERT_TRUE(moved.ok()) << moved.status();
+  EXPECT_FALSE((*moved)->imu_noise());
+  const CameraCalibration& in_I = *(*moved)->cameras()[0].calibration;
+  const CameraCalibration& in_B = *(*whole)->cameras()[0].calibration;
+  // (1, 2, 3) of I is at (-2, 1, 3) + (0.1, 0.2, 0.3) of B.
+  const Eigen::Vector3d a = in_I.q_CI * Eigen::Vector3d(1, 2, 3) + in_I.p_CI;
+  const Eigen::Vector3d b =
+      in_B.q_CI * Eigen::Vector3d(-1.9, 1.2, 3.3) + in_B.p_CI;
+  EXPECT_LT((a - b).norm(), 1e-12);
+}
+
 TEST_F(EurocReader, StampsOutOfOrderAreSorted) {
   const std::string first = Stamp(1) + "," + Stamp(1) + ".png\n";
   const std::string second = Stamp(2) + "," + Stamp(2) + ".png\n";

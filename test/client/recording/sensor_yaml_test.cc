@@ -71,6 +71,25 @@ TEST(SensorYaml, WhatIsWrongIsNamed) {
   EXPECT_FALSE(ParseCameraYaml("a: [").ok());
 }
 
+TEST(SensorYaml, TheNoiseOfAnImuIsThatOfFourDensities) {
+  const std::string four =
+      "gyroscope_noise_density: 1.0e-04\n"
+      "gyroscope_random_walk: 2.0e-05\n"
+      "accelerometer_noise_density: 3.0e-03\n"
+      "accelerometer_random_walk: 4.0e-03\n";
+  const auto imu = ParseImuYaml("sensor_type: imu\n" + four);
+  ASSERT_TRUE(imu.ok()) << imu.status();
+  ASSERT_TRUE(imu->noise);
+  EXPECT_EQ(imu->noise->gyro_noise_density, 1e-4);
+  EXPECT_EQ(imu->noise->gyro_bias_random_walk, 2e-5);
+  EXPECT_EQ(imu->noise->accel_noise_density, 3e-3);
+  EXPECT_EQ(imu->noise->accel_bias_random_walk, 4e-3);
+  EXPECT_TRUE(imu->T_BI.isApprox(Eigen::Isometry3d::Identity()));
+  EXPECT_FALSE(ParseImuYaml("gyroscope_noise_density: 1.0e-04\n")->noise);
+  EXPECT_EQ(ParseImuYaml("accelerometer_random_walk: 0\n").status().message(),
+            "accelerometer_random_walk is not positive");
+}
+
 TEST(SensorYaml, EurocsOwnIsRead) {
   SELFCAL_NEED_RECORDING(folder, "euroc_images");
   const auto camera =
@@ -78,6 +97,11 @@ TEST(SensorYaml, EurocsOwnIsRead) {
   ASSERT_TRUE(camera.ok()) << camera.status();
   EXPECT_EQ(camera->f.x(), 458.654);
   EXPECT_EQ(camera->distortion[3], 1.76187114e-05);
+  const auto imu = ParseImuYaml(ReadBytes(folder + "/mav0/imu0/sensor.yaml"));
+  ASSERT_TRUE(imu.ok()) << imu.status();
+  ASSERT_TRUE(imu->noise);
+  EXPECT_EQ(imu->noise->gyro_noise_density, 1.6968e-4);
+  EXPECT_EQ(imu->noise->accel_bias_random_walk, 3e-3);
 }
 
 }  // namespace
