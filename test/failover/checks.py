@@ -15,7 +15,9 @@ from failover.local_daemon import LocalDaemon
 from failover.running_fleet import RunningFleet
 from selfcal.v1 import rig_pb2, segment_pb2, store_service_pb2
 
-_SETTLE_S = 120
+# Without progress. A run has a low priority: on a busy machine one that takes
+# seconds takes minutes.
+_STUCK_S = 300
 _MAX_ATTEMPTS = 3  # of a run (server/pipeline/run_execution.h)
 
 
@@ -67,28 +69,36 @@ def create_rig(fleet: RunningFleet, rig: rig_pb2.Rig) -> None:
 
 
 def settled(fleet: RunningFleet, rigs: list) -> list:
-    """Waits until everything is scored, and every run has ended."""
+    """Waits until everything is scored, and every run has ended, as long as
+    there is progress.
+    """
     sql = (
         "SELECT id, (SELECT count(*) FROM segments s"
         "    WHERE s.rig = r.rig AND state = 1),"
         "  (SELECT count(*) FROM runs u"
         "    WHERE u.rig = r.rig AND state IN (1, 2)),"
         "  (SELECT replica || ' ' || number FROM claims c"
-        "    WHERE c.rig = r.rig)"
+        "    WHERE c.rig = r.rig),"
+        "  (SELECT count(*) FROM runs u WHERE u.rig = r.rig)"
         " FROM rigs r WHERE id = ANY(%s)"
     )
-    deadline = time.monotonic() + _SETTLE_S
+    before: list = []
+    progress = time.monotonic()
     quiet = 0
     while quiet < 3:  # the end of a run may start another one
         busy = [row for row in fleet.query(sql, rigs) if row[1] or row[2]]
         quiet = 0 if busy else quiet + 1
-        if busy and time.monotonic() > deadline:
+        # Of each rig: unscored segments, unfinished runs and all runs.
+        now = [(row[0], row[1], row[2], row[4]) for row in busy]
+        if now != before:
+            before, progress = now, time.monotonic()
+        if busy and time.monotonic() > progress + _STUCK_S:
             alive = [row[0] for row in fleet.query("TABLE replicas")]
             return [
                 f"rig {rig}: {unscored} segments without a score and {runs} "
-                f"unfinished runs after {_SETTLE_S} s; claim {claim}, "
+                f"unfinished runs, unchanged for {_STUCK_S} s; claim {claim}, "
                 f"replicas {alive}"
-                for rig, unscored, runs, claim in busy
+                for rig, unscored, runs, claim, _ in busy
             ]
         time.sleep(0.4)
     return []
@@ -201,7 +211,7 @@ def _runs_and_versions(fleet: RunningFleet, rig_id: str) -> tuple:
     """As they are while no run is under way: the end of a session starts one
     some seconds later.
     """
-    deadline = time.monotonic() + _SETTLE_S
+    deadline = time.monotonic() + _STUCK_S
     while True:
         read = [
             fleet.query(sql, rig_id)
