@@ -28,6 +28,7 @@ void RunWrongNoise(Context* context);
 void RunDegenerate(Context* context);
 void RunTrust(Context* context);
 void RunOpenVinsScenario(Context* context);
+void RunOpenVinsRolling(Context* context);
 void RunPopulation(Context* context);
 
 const std::vector<Experiment>& Experiments() {
@@ -101,6 +102,9 @@ const std::vector<Experiment>& Experiments() {
       {"openvins_scenario",
        "tables and batch on the scenario of OpenVINS's simulator",
        RunOpenVinsScenario},
+      {"openvins_rolling",
+       "the same with a rolling shutter of unknown line delay",
+       RunOpenVinsRolling},
       {"population",
        "new devices of a cohort: segments to the target with its prior, and "
        "devices that are not like it",
