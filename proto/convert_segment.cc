@@ -177,6 +177,9 @@ v1::MotionSegment ToProto(const MotionSegment& segment) {
   }
   FillObservations(segment.observations, message.mutable_observations());
   if (segment.temperature_c) message.set_temperature_c(*segment.temperature_c);
+  if (segment.session_start_ns) {
+    message.set_session_start_ns(*segment.session_start_ns);
+  }
   return message;
 }
 
@@ -191,6 +194,9 @@ std::vector<Violation> FromProto(const v1::MotionSegment& message,
   }
   if (message.has_temperature_c()) {
     read.temperature_c = message.temperature_c();
+  }
+  if (message.has_session_start_ns()) {
+    read.session_start_ns = message.session_start_ns();
   }
   // A segment may have no observations, but must have keyframes and samples.
   if (!message.has_keyframes()) {

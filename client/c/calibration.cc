@@ -98,6 +98,8 @@ selfcal_camera ToCamera(const CameraCalibration& given) {
   camera.time_offset_s = given.time_offset_s;
   camera.rolling_shutter = given.line_delay_s.has_value();
   camera.line_delay_s = given.line_delay_s.value_or(0);
+  camera.clock_drifts = given.time_drift.has_value();
+  camera.time_drift = given.time_drift.value_or(0);
   return camera;
 }
 
@@ -175,6 +177,7 @@ absl::Status FromCamera(const selfcal_camera* given,
   camera->p_CI = Eigen::Vector3d(read.p_CI);
   camera->time_offset_s = read.time_offset_s;
   if (read.rolling_shutter != 0) camera->line_delay_s = read.line_delay_s;
+  if (read.clock_drifts != 0) camera->time_drift = read.time_drift;
   camera->width_px = read.width_px;
   camera->height_px = read.height_px;
   return status;

@@ -106,6 +106,9 @@ absl::StatusOr<client::SegmentBuilderOptions> ToOptions(
   Set(read.min_keyframes, &options.min_keyframes);
   Set(read.pixel_sigma_px, &options.pixel_sigma_px);
   Set(read.gravity_mps2, &options.gravity_mps2);
+  if (read.session_start_ns != 0) {
+    options.session_start_ns = read.session_start_ns;
+  }
   options.new_ids_after_gap = read.same_ids_after_gap == 0;
   return options;
 }

@@ -167,6 +167,10 @@ typedef struct selfcal_builder_options {
   // as those of a SLAM system with a map do.
   int32_t same_ids_after_gap;
   uint32_t reserved;
+  // The time at which the session began, for a builder that continues one;
+  // default: that of the first keyframe. The time offset of a camera whose
+  // clock drifts is that of this time.
+  int64_t session_start_ns;
 } selfcal_builder_options;
 
 typedef struct selfcal_builder_statistics {
@@ -469,6 +473,11 @@ typedef struct selfcal_camera {
   int32_t rolling_shutter;
   uint32_t reserved;
   double line_delay_s;
+  // Drift of the clock [s/s]: time_offset_s is the offset where a session
+  // begins, and grows by this each second.
+  int32_t clock_drifts;  // zero: it does not, and time_drift is not used
+  uint32_t reserved2;
+  double time_drift;
 } selfcal_camera;
 
 // One component of the tangent space of the calibration. The names and units

@@ -203,6 +203,7 @@ ExportedFiles ExportBasalt(const Rig& rig,
   AddOdometryLoss(theta.cameras[0].time_offset_s, &result.losses);
   AddSharedOffsetLosses("basalt", theta, &result.losses);
   AddLineDelayLosses("basalt", theta, &result.losses);
+  AddTimeDriftLosses("basalt", theta, &result.losses);
   AddGravityLoss("basalt", rig, &result.losses);
   result.files = {{"calibration.json", Json{{"value0", root}}.dump(2) + "\n"}};
   return result;

@@ -181,6 +181,7 @@ void AddRestOfRig(const Rig& rig,
   }
   AddTimeOffsetLosses(kTool, theta, losses);
   AddLineDelayLosses(kTool, theta, losses);
+  AddTimeDriftLosses(kTool, theta, losses);
   AddGravityLoss(kTool, rig, losses);
   losses->push_back({"imu_noise",
                      "camera_info has no IMU: `selfcal rig show` has its noise",

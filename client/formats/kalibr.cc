@@ -146,6 +146,7 @@ ExportedFiles ExportKalibr(const Rig& rig,
   UseModelsOf("kalibr", &cameras);
   AddPinholeLosses("kalibr", cameras, &result.losses);
   AddLineDelayLosses("kalibr", theta, &result.losses);
+  AddTimeDriftLosses("kalibr", theta, &result.losses);
   for (std::size_t j = 0; j < cameras.size(); ++j) {
     const CameraCalibration& camera = cameras[j];
     CheckCamera(j, camera);

@@ -100,6 +100,23 @@ void AddLineDelayLosses(const std::string& tool,
   }
 }
 
+void AddTimeDriftLosses(const std::string& tool,
+                        const Calibration& theta,
+                        std::vector<Loss>* losses) {
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    const CameraCalibration& camera = theta.cameras[j];
+    if (!camera.time_drift) continue;
+    losses->push_back(
+        {fmt::format("cam{}.time_drift", j),
+         fmt::format("{} has a constant time offset, while this one is that of "
+                     "the begin of a session and grows by {} s each second: "
+                     "add this to the timestamps of its images",
+                     tool,
+                     *camera.time_drift),
+         true});
+  }
+}
+
 void AddPinholeLosses(const std::string& tool,
                       const std::vector<CameraCalibration>& cameras,
                       std::vector<Loss>* losses,

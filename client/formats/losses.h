@@ -41,6 +41,11 @@ void AddLineDelayLosses(const std::string& tool,
                         const Calibration& theta,
                         std::vector<Loss>* losses);
 
+// A tool whose cameras have a constant time offset.
+void AddTimeDriftLosses(const std::string& tool,
+                        const Calibration& theta,
+                        std::vector<Loss>* losses);
+
 // For tools whose gravity is set elsewhere, or fixed.
 void AddGravityLoss(const std::string& tool,
                     const Rig& rig,

@@ -279,6 +279,7 @@ ExportedFiles ExportMaplab(const Rig& rig,
   text += "extrinsics:\n" + PlaceText(imu, imu) + PlaceText(system, imu);
   AddImuLoss("maplab", theta.imu, &result.losses);
   AddTimeOffsetLosses("maplab", theta, &result.losses);
+  AddTimeDriftLosses("maplab", theta, &result.losses);
   result.files = {{"sensors.yaml", text}};
   return result;
 }

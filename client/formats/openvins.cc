@@ -129,6 +129,7 @@ ExportedFiles ExportOpenVins(const Rig& rig,
   AddPositionLoss("openvins", theta.imu, &result.losses);
   AddSharedOffsetLosses("openvins", theta, &result.losses);
   AddLineDelayLosses("openvins", theta, &result.losses);
+  AddTimeDriftLosses("openvins", theta, &result.losses);
   AddGravityLoss("openvins", rig, &result.losses);
   result.files = {{"kalibr_imucam_chain.yaml", chain},
                   {"kalibr_imu_chain.yaml", imu}};

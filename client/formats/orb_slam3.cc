@@ -169,6 +169,7 @@ ExportedFiles ExportOrbSlam3(const Rig& rig,
   AddImuLoss("orb_slam3", theta.imu, &result.losses);
   AddTimeOffsetLosses("orb_slam3", kept, &result.losses);
   AddLineDelayLosses("orb_slam3", kept, &result.losses);
+  AddTimeDriftLosses("orb_slam3", kept, &result.losses);
   AddGravityLoss("orb_slam3", rig, &result.losses);
   result.losses.push_back(
       {"settings",

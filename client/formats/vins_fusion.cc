@@ -197,6 +197,7 @@ ExportedFiles ExportVinsFusion(const Rig& rig,
   AddImuLoss("vins_fusion", theta.imu, &result.losses);
   AddSharedOffsetLosses("vins_fusion", kept, &result.losses);
   AddLineDelayLosses("vins_fusion", kept, &result.losses);
+  AddTimeDriftLosses("vins_fusion", kept, &result.losses);
   result.losses.push_back(
       {"settings",
        "those of its tracker, solver and topics are not part of a calibration: "

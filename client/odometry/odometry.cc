@@ -34,6 +34,11 @@ int KeyframeStep(const std::vector<ImageSet>& sets, double rate_hz) {
   return std::max(1, static_cast<int>(std::ceil(1 / (rate_hz * step_s) - 0.1)));
 }
 
+std::optional<std::int64_t> SessionStart(const std::vector<ImageSet>& sets) {
+  if (sets.empty()) return std::nullopt;
+  return sets.front().t_ns;
+}
+
 struct Keyframe {
   std::int64_t t_ns = 0;
   std::vector<TrackPoint> points;
@@ -52,7 +57,7 @@ class Odometry::Impl {
         options_(options),
         sets_(ImageSets(*recording)),
         step_(KeyframeStep(sets_, options.keyframe_rate_hz)),
-        tracker_(theta, {}),
+        tracker_(theta, {.session_start_ns = SessionStart(sets_)}),
         index_(options.first_index) {
     if (options.after_ns) {
       next_set_ = static_cast<std::size_t>(
@@ -98,10 +103,30 @@ class Odometry::Impl {
     return 1e-9 * static_cast<double>(gap_ns) > options_.max_gap_s;
   }
 
-  absl::Status ReadSet() {
-    const ImageSet& set = sets_[next_set_];
-    std::vector<GreyPixels> pixels(set.images.size());
-    std::vector<cv::Mat> images(set.images.size());
+  // The points that the recording has instead of images; nullopt for one with
+  // images.
+  std::optional<std::vector<TrackPoint>> RecordedPoints(
+      const ImageSet& set) const {
+    std::optional<std::vector<TrackPoint>> points;
+    for (int j = 0; j < static_cast<int>(set.images.size()); ++j) {
+      if (set.images[j] < 0) continue;
+      const auto* recorded = recording_->Points(j, set.images[j]);
+      if (recorded == nullptr) return std::nullopt;
+      if (!points) points.emplace();
+      for (const RecordedPoint& point : *recorded) {
+        points->push_back({.landmark = point.landmark,
+                           .camera = j,
+                           .image = static_cast<int>(next_set_),
+                           .z_px = point.z_px});
+      }
+    }
+    return points;
+  }
+
+  // Images that cannot be read stay empty, and are counted.
+  absl::Status ReadImages(const ImageSet& set,
+                          std::vector<GreyPixels>* pixels) {
+    pixels->resize(set.images.size());
     for (std::size_t j = 0; j < set.images.size(); ++j) {
       if (set.images[j] < 0) continue;
       auto read = recording_->ReadImage(static_cast<int>(j), set.images[j]);
@@ -110,31 +135,43 @@ class Odometry::Impl {
         progress_.last_error = std::string(read.status().message());
         continue;
       }
-      pixels[j] = *std::move(read);
+      GreyPixels& image = (*pixels)[j];
+      image = *std::move(read);
       const CameraCalibration& camera = rig_.factory.cameras[j];
-      if (pixels[j].width_px != camera.width_px ||
-          pixels[j].height_px != camera.height_px) {
+      if (image.width_px != camera.width_px ||
+          image.height_px != camera.height_px) {
         return absl::InvalidArgumentError(
             fmt::format("the images of {} have {} x {} px, while the "
                         "calibration is for {} x {} px",
                         recording_->cameras()[j].name,
-                        pixels[j].width_px,
-                        pixels[j].height_px,
+                        image.width_px,
+                        image.height_px,
                         camera.width_px,
                         camera.height_px));
       }
+    }
+    const std::size_t read = next_set_ + 1;
+    if (progress_.unreadable >= kMinUnreadable &&
+        2 * progress_.unreadable > read * recording_->cameras().size()) {
+      return absl::DataLossError(
+          fmt::format("most images cannot be read, the last one because: {}",
+                      progress_.last_error));
+    }
+    return absl::OkStatus();
+  }
+
+  // Follows the tracks into the images of a set.
+  absl::StatusOr<std::vector<TrackPoint>> Follow(const ImageSet& set) {
+    std::vector<GreyPixels> pixels;
+    const absl::Status status = ReadImages(set, &pixels);
+    if (!status.ok()) return status;
+    std::vector<cv::Mat> images(pixels.size());
+    for (std::size_t j = 0; j < pixels.size(); ++j) {
+      if (pixels[j].pixels.empty()) continue;
       images[j] = cv::Mat(pixels[j].height_px,
                           pixels[j].width_px,
                           CV_8UC1,
                           pixels[j].pixels.data());
-    }
-    progress_.images = next_set_ + 1;
-    if (progress_.unreadable >= kMinUnreadable &&
-        2 * progress_.unreadable >
-            progress_.images * recording_->cameras().size()) {
-      return absl::DataLossError(
-          fmt::format("most images cannot be read, the last one because: {}",
-                      progress_.last_error));
     }
     const std::span<const ImuSample> imu = recording_->imu();
     for (; next_sample_ < imu.size() &&
@@ -142,9 +179,20 @@ class Odometry::Impl {
          ++next_sample_) {
       tracker_.AddImu(imu[next_sample_]);
     }
-    std::vector<TrackPoint> points = tracker_.Track(set.t_ns, images);
+    return tracker_.Track(set.t_ns, images);
+  }
+
+  absl::Status ReadSet() {
+    const ImageSet& set = sets_[next_set_];
+    std::optional<std::vector<TrackPoint>> points = RecordedPoints(set);
+    if (!points) {
+      auto followed = Follow(set);
+      if (!followed.ok()) return followed.status();
+      points = *std::move(followed);
+    }
+    progress_.images = next_set_ + 1;
     if (next_set_ % static_cast<std::size_t>(step_) == 0 && Covered(set.t_ns)) {
-      keyframes_.push_back({set.t_ns, std::move(points)});
+      keyframes_.push_back({set.t_ns, *std::move(points)});
     }
     ++next_set_;
     return absl::OkStatus();
@@ -210,6 +258,7 @@ class Odometry::Impl {
                          std::int64_t next_ns) const {
     MotionSegment segment;
     segment.key = {options_.session, index_};
+    segment.session_start_ns = SessionStart(sets_);
     segment.imu = Readings(keyframes.front().t_ns, next_ns);
     std::map<std::uint64_t, int> seen;
     for (const Keyframe& keyframe : keyframes) {

@@ -79,9 +79,9 @@ class Landmarks {
   }
 
   // Triangulates the landmarks without a position, and removes those that have
-  // none then.
+  // none then. `segment` has its keyframes.
   void CompletePositions(const ClosedSegment& closed,
-                         const std::vector<KeyframeState>& states,
+                         const MotionSegment& segment,
                          AssemblyStatistics* statistics) {
     const auto lacks_position = [](const auto& entry) {
       return !entry.second.p_G.has_value();
@@ -89,7 +89,7 @@ class Landmarks {
     const auto count = static_cast<std::uint64_t>(
         std::count_if(records_.begin(), records_.end(), lacks_position));
     if (count == 0) return;
-    if (closed.theta != nullptr) Triangulate(closed, states);
+    if (closed.theta != nullptr) Triangulate(closed, segment);
     const std::uint64_t dropped = std::erase_if(records_, lacks_position);
     statistics->tracks_dropped += dropped;
     statistics->tracks_triangulated += count - dropped;
@@ -116,13 +116,16 @@ class Landmarks {
   }
 
  private:
-  void Triangulate(const ClosedSegment& closed,
-                   const std::vector<KeyframeState>& states) {
+  void Triangulate(const ClosedSegment& closed, const MotionSegment& segment) {
     const std::vector<Track> tracks =
         TracksWithoutPosition(closed.theta->cameras.size());
+    std::vector<KeyframeContext> contexts;
+    for (const KeyframeState& x : segment.keyframes) {
+      contexts.push_back({closed.imu, SessionTime(segment, x)});
+    }
     const auto positions = TriangulateTracks(*closed.theta,
-                                             states,
-                                             closed.imu,
+                                             segment.keyframes,
+                                             contexts,
                                              tracks,
                                              closed.pixel_sigma_px,
                                              closed.gravity_mps2);
@@ -210,12 +213,13 @@ MotionSegment Assemble(const ClosedSegment& closed,
   segment.key = closed.key;
   segment.calibration_version = closed.calibration_version;
   segment.temperature_c = closed.temperature_c;
+  segment.session_start_ns = closed.session_start_ns;
   segment.keyframes = StatesAtImages(closed);
   segment.imu = ImuBetween(closed.imu, closed.begin_ns, closed.end_ns);
   const KeyframeSightings sightings = WithoutDuplicates(closed.keyframes);
   Landmarks landmarks(sightings, closed.min_observations);
   landmarks.CompletePositions(
-      closed, segment.keyframes, statistics == nullptr ? &unused : statistics);
+      closed, segment, statistics == nullptr ? &unused : statistics);
   landmarks.AddTo(&segment);
   return segment;
 }

@@ -51,6 +51,7 @@ struct ClosedSegment {
   std::int64_t begin_ns = 0;
   std::int64_t end_ns = 0;
   std::optional<double> temperature_c = std::nullopt;  // of the device
+  std::optional<std::int64_t> session_start_ns = std::nullopt;
   // The calibration that the SLAM system used, a valid one, or null if it is
   // not known: then landmarks without a position are left out, and states are
   // moved with the readings as they are, less their biases.

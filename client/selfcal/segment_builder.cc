@@ -163,6 +163,7 @@ struct SegmentBuilder::State {
     segment.calibration_version = keyframes.front().estimation.version;
     segment.min_observations = options.min_observations;
     segment.temperature_c = temperature_c;
+    segment.session_start_ns = options.session_start_ns;
     segment.begin_ns = Earlier(keyframes.front().begin_ns(), padding_ns);
     segment.end_ns = end_ns;
     segment.theta = keyframes[size - 1].estimation.theta;
@@ -304,6 +305,7 @@ bool SegmentBuilder::State::AddKeyframe(
                         estimation};
   added.observed.state.t_ns = image_t_ns;
   keyframes.push_back(std::move(added));
+  if (!options.session_start_ns) options.session_start_ns = image_t_ns;
   last_keyframe_ns = image_t_ns;
   CloseWhatIs();
   return true;

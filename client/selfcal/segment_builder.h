@@ -69,6 +69,10 @@ struct SegmentBuilderOptions {
   // A segment has the samples of this time before its first keyframe, and after
   // its last one, as far as there are any when it is flushed.
   double padding_s = kImuPadding_s;
+  // The time at which the session began, for a builder that continues one; by
+  // default that of the first keyframe. The time offset of a camera whose clock
+  // drifts is that of this time.
+  std::optional<std::int64_t> session_start_ns = std::nullopt;
 };
 
 struct SegmentBuilderStatistics {

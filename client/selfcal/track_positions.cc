@@ -48,19 +48,19 @@ std::optional<Eigen::Vector3d> TriangulateOne(const LandmarkScene& scene,
 std::vector<std::optional<Eigen::Vector3d>> TriangulateTracks(
     const Calibration& theta,
     std::span<const KeyframeState> keyframes,
-    std::span<const ImuSample> imu,
+    std::span<const KeyframeContext> contexts,
     std::span<const Track> tracks,
     double pixel_sigma_px,
     double gravity_mps2) {
   Rig rig;
   rig.gravity_mps2 = gravity_mps2;
   KeyframeMotions motions;
-  if (!imu.empty()) {
+  if (!contexts.empty()) {
     motions.Measure(rig,
                     theta,
                     std::vector<char>(theta.cameras.size(), 0),
                     keyframes,
-                    [&](std::size_t) { return imu; });
+                    [&](std::size_t k) { return contexts[k]; });
   }
   const LandmarkScene scene(theta, keyframes, motions, pixel_sigma_px);
   std::vector<std::optional<Eigen::Vector3d>> positions;

@@ -86,6 +86,9 @@ std::vector<TrackPoint> FeatureTracker::Track(
   counts_ = {};
   std::vector<char> present(cameras_.size(), 0);
   double earliest_s = static_cast<double>(t_ns) * 1e-9;
+  if (!options_.session_start_ns) options_.session_start_ns = t_ns;
+  const double session_s =
+      1e-9 * static_cast<double>(t_ns - *options_.session_start_ns);
   for (std::size_t j = 0; j < cameras_.size() && j < images.size(); ++j) {
     const CameraCalibration& c = cameras_[j].theta;
     if (images[j].type() != CV_8UC1 || images[j].cols != c.width_px ||
@@ -95,7 +98,7 @@ std::vector<TrackPoint> FeatureTracker::Track(
     present[j] = 1;
     Follow(static_cast<int>(j),
            images[j],
-           static_cast<double>(t_ns) * 1e-9 + c.time_offset_s);
+           static_cast<double>(t_ns) * 1e-9 + TimeOffsetAt(c, session_s));
   }
   for (std::size_t a = 0; a < cameras_.size(); ++a) {
     if (present[a]) Replenish(static_cast<int>(a), present);

@@ -34,8 +34,8 @@ struct TrackerOptions {
   // Corners begin in a camera with fewer tracks; matches of other cameras come
   // on top, up to as many again.
   int max_tracks = 200;
-  CornerOptions corners;
-  FlowOptions flow;
+  CornerOptions corners = {};
+  FlowOptions flow = {};
   // The distance of matches from their epipolar plane, between the images of
   // one camera and between those of two.
   double max_epipolar_px = 1.0;
@@ -49,6 +49,8 @@ struct TrackerOptions {
   bool align = true;
   double min_correlation = 0.8;  // of the greys of both patches
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();  // [rad/s]
+  // From which on the clocks of cameras drift; by default the first image.
+  std::optional<std::int64_t> session_start_ns = std::nullopt;
 };
 
 // One point of a track.

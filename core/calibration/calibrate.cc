@@ -164,27 +164,56 @@ CalibrationResult CalibrateOnWhatAgrees(
   return std::move(run.result);
 }
 
-// Moves segments whose states do not hold at their stamps, and the time offsets
-// of theta by the median of what these segments show. `moved` has room for all
-// and holds those that replace elements of `segments`.
+// A time offset that a segment shows beyond that of theta, and when.
+struct OffsetShift {
+  double session_s;
+  double shift_s;
+};
+
+// Moves the time offsets of theta by the median of the shifts, and its time
+// drifts, if every camera has one, by the median slope between any two.
+void MoveClocks(const std::vector<OffsetShift>& shifts, Calibration* theta) {
+  const bool drifts = std::all_of(
+      theta->cameras.begin(),
+      theta->cameras.end(),
+      [](const CameraCalibration& camera) { return camera.time_drift; });
+  std::vector<double> slopes;
+  for (const OffsetShift& a : shifts) {
+    for (const OffsetShift& b : shifts) {
+      if (!drifts || !(a.session_s < b.session_s)) continue;
+      slopes.push_back((b.shift_s - a.shift_s) / (b.session_s - a.session_s));
+    }
+  }
+  const double drift = slopes.empty() ? 0 : UpperMedian(std::move(slopes));
+  std::vector<double> offsets_s;
+  for (const OffsetShift& at : shifts) {
+    offsets_s.push_back(at.shift_s - drift * at.session_s);
+  }
+  const double offset_s = UpperMedian(std::move(offsets_s));
+  for (CameraCalibration& camera : theta->cameras) {
+    camera.time_offset_s += offset_s;
+    if (drifts) *camera.time_drift += drift;
+  }
+}
+
+// Moves segments whose states do not hold at their stamps, and the clocks of
+// theta by what these segments show. `moved` has room for all and holds those
+// that replace elements of `segments`.
 void StartAtOffsets(const Rig& rig,
                     Calibration* theta,
                     std::vector<const MotionSegment*>* segments,
                     std::vector<MotionSegment>* moved) {
-  std::vector<double> shifts;
+  std::vector<OffsetShift> shifts;
   moved->reserve(segments->size());
   for (const MotionSegment*& segment : *segments) {
     std::optional<OffsetStart> start = FindOffsetStart(rig, *theta, *segment);
     if (!start) continue;
     moved->push_back(std::move(start->segment));
     segment = &moved->back();
-    shifts.push_back(start->shift_s);
+    shifts.push_back(
+        {SessionTime(*segment, segment->keyframes.front()), start->shift_s});
   }
-  if (shifts.empty()) return;
-  const double shift_s = UpperMedian(std::move(shifts));
-  for (CameraCalibration& camera : theta->cameras) {
-    camera.time_offset_s += shift_s;
-  }
+  if (!shifts.empty()) MoveClocks(shifts, theta);
 }
 
 }  // namespace

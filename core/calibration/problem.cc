@@ -122,7 +122,9 @@ CalibrationProblem FlattenSegments(
     problem.keyframes.insert(problem.keyframes.end(),
                              segment->keyframes.begin(),
                              segment->keyframes.end());
-    problem.samples.resize(problem.keyframes.size(), segment->imu);
+    for (std::size_t k = 0; k < segment->keyframes.size(); ++k) {
+      problem.contexts.push_back(ContextOf(*segment, k));
+    }
   }
   for (const SegmentJoint& joint : partitioning.joints) {
     const int after = first_keyframe[joint.after];
@@ -172,7 +174,7 @@ void MeasureMotions(const Rig& rig,
                     KeyframeMotions* motions) {
   motions->Measure(
       rig, theta, EstimatedTimeOffsets(rig), keyframes, [&](std::size_t k) {
-        return problem.samples[k];
+        return problem.contexts[k];
       });
 }
 

@@ -54,8 +54,9 @@ struct BiasLink {
 
 struct CalibrationProblem {
   std::vector<KeyframeState> keyframes;  // as the SLAM system estimated them
-  // Samples about each keyframe: those of its segment, which must outlive them.
-  std::vector<std::span<const ImuSample>> samples;
+  // Of each keyframe. The samples are those of its segment, which must outlive
+  // them.
+  std::vector<KeyframeContext> contexts;
   // First keyframe of each set of chains that share landmarks: holds the gauge.
   std::vector<int> gauge_keyframes;
   // First keyframe of each chain of inertial links.

@@ -20,9 +20,10 @@ MotionSegment SimulatePrimitive(const Rig& rig,
                                 const Calibration& theta_slam,
                                 const Primitive& primitive,
                                 const SimulationOptions& options) {
-  const TimeMargins margins = ExposureMargins(theta_true, theta_slam);
-  const double duration_s =
-      SegmentDuration(options) + kSlack_s + margins.before_s + margins.after_s;
+  const double segment_s = SegmentDuration(options) + kSlack_s;
+  const TimeMargins margins =
+      ExposureMargins(theta_true, theta_slam, options.session_age_s, segment_s);
+  const double duration_s = segment_s + margins.before_s + margins.after_s;
   const auto trajectory =
       Perform(primitive, theta_true, duration_s, options.seed);
   return Simulate(rig,

@@ -257,6 +257,10 @@ ExposurePose Moved(const Eigen::Quaterniond& q_GI,
 
 }  // namespace
 
+KeyframeContext ContextOf(const MotionSegment& segment, std::size_t keyframe) {
+  return {segment.imu, SessionTime(segment, segment.keyframes[keyframe])};
+}
+
 KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
                              const KeyframeState& x,
                              const ImuCalibration& imu,
@@ -266,19 +270,23 @@ KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
   return Measure(samples, x, imu, noise, gravity_mps2, dt_s, std::nullopt);
 }
 
-KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
+KeyframeMotion MeasureMotion(const KeyframeContext& context,
                              const KeyframeState& x,
                              const ImuCalibration& imu,
                              const ImuNoise& noise,
                              double gravity_mps2,
                              const CameraCalibration& camera) {
-  const double dt_s = MiddleRowDelay(camera);
+  const double first_row_s = TimeOffsetAt(camera, context.session_s);
+  const double dt_s = MiddleRowDelay(camera, context.session_s);
   std::optional<double> half_readout_s;
   if (camera.line_delay_s) {
     half_readout_s =
-        std::max(std::abs(dt_s - camera.time_offset_s), kLeastHalfReadout_s);
+        std::max(std::abs(dt_s - first_row_s), kLeastHalfReadout_s);
   }
-  return Measure(samples, x, imu, noise, gravity_mps2, dt_s, half_readout_s);
+  KeyframeMotion motion = Measure(
+      context.samples, x, imu, noise, gravity_mps2, dt_s, half_readout_s);
+  motion.session_s = context.session_s;
+  return motion;
 }
 
 ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
@@ -299,11 +307,11 @@ ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
                       const KeyframeMotion& motion,
                       const CameraCalibration& camera,
                       const Eigen::Vector2d& z_px) {
+  const double first_row_s = TimeOffsetAt(camera, motion.session_s);
   if (!camera.line_delay_s) {
-    return MovePose(q_GI, p_GI, motion, camera.time_offset_s);
+    return MovePose(q_GI, p_GI, motion, first_row_s);
   }
-  const double s =
-      camera.time_offset_s + *camera.line_delay_s * z_px.y() - motion.dt_s;
+  const double s = first_row_s + *camera.line_delay_s * z_px.y() - motion.dt_s;
   const Vector3d powers(s, s * s, s * s * s);
   const Vector3d slopes(1, 2 * s, 3 * s * s);
   const ReadoutMotion& readout = motion.readout;
@@ -331,7 +339,8 @@ void KeyframeMotions::FindCameras(const Calibration& theta,
   stride_ = 0;
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
     const CameraCalibration& camera = theta.cameras[j];
-    if (estimated[j] || camera.time_offset_s != 0 || camera.line_delay_s) {
+    if (estimated[j] || camera.time_offset_s != 0 || camera.line_delay_s ||
+        camera.time_drift) {
       index_[j] = stride_++;
     }
   }
@@ -346,7 +355,7 @@ KeyframeMotions SegmentMotions(const Rig& rig,
                   theta,
                   EstimatedTimeOffsets(rig),
                   segment.keyframes,
-                  [&](std::size_t) { return std::span(segment.imu); });
+                  [&](std::size_t k) { return ContextOf(segment, k); });
   return motions;
 }
 

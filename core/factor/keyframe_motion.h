@@ -24,6 +24,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -47,6 +48,14 @@ struct ReadoutMotion {
   double rate_share = 1;
 };
 
+// What is known about a keyframe beside its state.
+struct KeyframeContext {
+  std::span<const ImuSample> samples;  // about its time
+  double session_s = 0;                // its time since the session began
+};
+
+KeyframeContext ContextOf(const MotionSegment& segment, std::size_t keyframe);
+
 // Motion about the time dt_s after that of the keyframe.
 struct KeyframeMotion {
   double dt_s = 0;
@@ -56,6 +65,7 @@ struct KeyframeMotion {
   Eigen::Vector3d v_I = Eigen::Vector3d::Zero();      // [m/s], in I at t
   // The motion after dt_s, used with a rolling shutter alone.
   ReadoutMotion readout = {};
+  double session_s = 0;  // time of the keyframe since the session began
 };
 
 // Measures the motion from the samples about the keyframe, in order of time, at
@@ -72,7 +82,7 @@ KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
 
 // The same for a camera: to its exposure, or to that of its middle row with the
 // motion while it reads an image.
-KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
+KeyframeMotion MeasureMotion(const KeyframeContext& context,
                              const KeyframeState& x,
                              const ImuCalibration& imu,
                              const ImuNoise& noise,
@@ -116,20 +126,20 @@ class KeyframeMotions {
   }
 
   // `estimated` is nonzero for each camera whose offset is estimated;
-  // samples(k) are those about keyframe k.
-  template <typename Samples>
+  // context(k) is that of keyframe k.
+  template <typename Context>
   void Measure(const Rig& rig,
                const Calibration& theta,
                std::span<const char> estimated,
                std::span<const KeyframeState> keyframes,
-               const Samples& samples) {
+               const Context& context) {
     FindCameras(theta, estimated);
     if (index_.empty()) return;
     motions_.resize(keyframes.size() * stride_);
     for (std::size_t k = 0; k < keyframes.size(); ++k) {
       for (std::size_t j = 0; j < index_.size(); ++j) {
         if (index_[j] < 0) continue;
-        motions_[k * stride_ + index_[j]] = MeasureMotion(samples(k),
+        motions_[k * stride_ + index_[j]] = MeasureMotion(context(k),
                                                           keyframes[k],
                                                           theta.imu,
                                                           rig.imu_noise,

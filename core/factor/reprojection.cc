@@ -61,8 +61,13 @@ bool Reproject(const Eigen::Quaterniond& q_GI,
       projection.intrinsics;
   const int time = kCameraIntrinsics + intrinsics;
   jacobians->camera.col(time) = by_exposure * exposure.by_time;
+  int next = time + 1;
   if (camera.line_delay_s) {
-    jacobians->camera.col(time + 1) = z_px.y() * jacobians->camera.col(time);
+    jacobians->camera.col(next++) = z_px.y() * jacobians->camera.col(time);
+  }
+  if (camera.time_drift) {
+    jacobians->camera.col(next) = (motion != nullptr ? motion->session_s : 0) *
+                                  jacobians->camera.col(time);
   }
   return true;
 }

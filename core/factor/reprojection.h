@@ -25,9 +25,9 @@ struct ReprojectionJacobians {
   // perturbation.
   Eigen::Matrix<double, 2, 6> pose;
   // Derivative with respect to the camera's tangent (q_CI 3, p_CI 3, f 2, c 2,
-  // distortion, time offset, and line delay if it has one); zero for the latter
-  // two without a motion.
-  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 8 + kMaxIntrinsics> camera;
+  // distortion, time offset, and line delay and time drift if it has them);
+  // zero for those of time without a motion.
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxCameraTangentSize> camera;
   // Derivative with respect to (X, w). If w = 1 the first three columns are
   // with respect to p_G.
   Eigen::Matrix<double, 2, 4> landmark;

@@ -1,5 +1,7 @@
 #include "core/factor/reprojection_batch.h"
 
+#include <algorithm>
+
 #include "core/factor/reprojection_lanes.h"
 
 namespace selfcal {
@@ -14,22 +16,26 @@ bool IsRolling(const ObservationRun& run) {
   return run.camera->line_delay_s.has_value();
 }
 
+// The time of the first row.
+double FirstRow(const ObservationRun& run) {
+  return TimeOffsetAt(*run.camera, run.motion ? run.motion->session_s : 0);
+}
+
 // The pose to which the rows refer.
 ExposurePose ExposureOf(const ObservationRun& run) {
   const KeyframeState& x = *run.keyframe;
   if (run.motion == nullptr) return PoseAtRest(x.q_GI, x.p_GI);
-  return MovePose(
-      x.q_GI,
-      x.p_GI,
-      *run.motion,
-      IsRolling(run) ? run.motion->dt_s : run.camera->time_offset_s);
+  return MovePose(x.q_GI,
+                  x.p_GI,
+                  *run.motion,
+                  IsRolling(run) ? run.motion->dt_s : FirstRow(run));
 }
 
 // The motion of the body while a rolling shutter reads an image.
 void SetReadout(const ObservationRun& run, RunGeometry* geometry) {
   const KeyframeMotion at_rest;
   const KeyframeMotion& motion = run.motion != nullptr ? *run.motion : at_rest;
-  geometry->first_row_s = run.camera->time_offset_s - motion.dt_s;
+  geometry->first_row_s = FirstRow(run) - motion.dt_s;
   geometry->line_delay_s = *run.camera->line_delay_s;
   geometry->rate_share = motion.readout.rate_share;
   Eigen::Map<Eigen::Matrix3d>(geometry->turn) = motion.readout.turn;
@@ -73,6 +79,26 @@ void WithKernels(VectorWidth width,
   });
 }
 
+constexpr LandmarkRows kLongestRow = {kMaxCameraTangentSize, true};
+
+// Gives rows without the column of a time drift this column, in place: the last
+// of the camera's, a multiple of that of the time offset.
+void AddDriftColumn(const ObservationRun& run, double* rows) {
+  const LandmarkRows with = RowsOf(*run.camera);
+  const LandmarkRows without = {with.shared - 1, with.rolling};
+  const int offset =
+      without.Column(kCameraIntrinsics + run.camera->IntrinsicsSize());
+  const double session_s = run.motion ? run.motion->session_s : 0;
+  // Backwards: a row is written behind those that are still to be read.
+  for (int i = 2 * run.count - 1; i >= 0; --i) {
+    double row[kLongestRow.stride()] = {};
+    std::copy_n(rows + i * without.stride(), without.residual() + 1, row);
+    row[with.residual()] = row[without.residual()];
+    row[without.residual()] = session_s * row[offset];
+    std::copy_n(row, with.stride(), rows + i * with.stride());
+  }
+}
+
 }  // namespace
 
 LandmarkRows RowsOf(const CameraCalibration& camera) {
@@ -94,6 +120,7 @@ void ReprojectionBatch::Linearise(const ObservationRun& run,
         Kernels::Linearise(
             geometry, model, run, points, sigma_px, weights, rows);
       });
+  if (run.camera->time_drift) AddDriftColumn(run, rows);
 }
 
 void ReprojectionBatch::AddLandmarkSums(const ObservationRun& run,

@@ -114,7 +114,7 @@ void SegmentScorer::ScoreAt(const Rig& rig,
                    theta0,
                    components_.estimated_time_offsets(),
                    segment.keyframes,
-                   [&](std::size_t) { return std::span(segment.imu); });
+                   [&](std::size_t k) { return ContextOf(segment, k); });
   const InlierSelection& selection = selector_.Select(
       theta0, rig.pixel_sigma_px, segment, motions_, order_, options);
   const LinearisedSegment& linearised =

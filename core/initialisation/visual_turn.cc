@@ -58,7 +58,7 @@ std::vector<VisualTurn> VisualTurns(const RayImages& rays,
   options.rotation_sigma_rad = kRotationSigma_rad;
   options.flow_share = kFlowShare;
   const CameraCalibration& camera = rays.camera();
-  const double middle_s = MiddleRowDelay(camera) - camera.time_offset_s;
+  const double middle_s = MiddleRowDelay(camera, 0) - camera.time_offset_s;
   std::vector<VisualTurn> turns;
   std::vector<RayPair> matches;
   for (const ImagePair& pair : pairs) {

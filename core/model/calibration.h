@@ -2,14 +2,15 @@
 // space of named components.
 //
 // Order of the tangent, ImuTangentSize + sum over cameras of (6 + 4 +
-// distortion + 1 or 2) components:
+// distortion + 1 to 3) components:
 //   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3, and those that it has of
 //   g-sensitivity 9 and position of the accelerometer 3 or 9;
-//   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1, and
-//   line delay 1 if its shutter is a rolling one.
+//   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1,
+//   line delay 1 if its shutter is a rolling one, and time drift 1 if its clock
+//   drifts.
 // Rotations are perturbed on the right (so3.h); all other components are
 // additive. Source: Schneider et al., ICRA 2017, sections III-B and III-C; the
-// time offset, the line delay and the optional parts of the IMU are extensions.
+// time offset and all optional parts are extensions.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,6 +40,9 @@ inline constexpr int kCameraRotation = 0;
 inline constexpr int kCameraPosition = kCameraRotation + 3;
 inline constexpr int kCameraIntrinsics = kCameraPosition + 3;
 inline constexpr int kCameraDistortion = kCameraIntrinsics + 4;
+// The largest size of a camera's tangent.
+inline constexpr int kMaxCameraTangentSize =
+    kCameraIntrinsics + kMaxIntrinsics + 3;
 
 // The value of an optional block: of size 0 if the sensor lacks it. Stored
 // without allocation.
@@ -98,7 +102,7 @@ int ImuTangentSize(const ImuCalibration& imu);
 // Dimension of the tangent of camera j, and its offset in that of theta.
 int CameraTangentSize(const CameraCalibration& camera);
 int CameraTangentOffset(const Calibration& theta, int camera);
-// Index of the time offset of camera j, which the line delay follows.
+// Index of the time offset of camera j, which line delay and drift follow.
 int TimeOffsetComponent(const Calibration& theta, int camera);
 
 // The components in the order of the tangent.

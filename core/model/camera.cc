@@ -111,8 +111,12 @@ bool Unproject(const CameraCalibration& camera,
   return true;
 }
 
-double MiddleRowDelay(const CameraCalibration& camera) {
-  return camera.time_offset_s +
+double TimeOffsetAt(const CameraCalibration& camera, double session_s) {
+  return camera.time_offset_s + camera.time_drift.value_or(0) * session_s;
+}
+
+double MiddleRowDelay(const CameraCalibration& camera, double session_s) {
+  return TimeOffsetAt(camera, session_s) +
          camera.line_delay_s.value_or(0) * camera.height_px / 2;
 }
 

@@ -57,6 +57,10 @@ struct CameraCalibration {
   // exposed v line_delay_s after its first one, to whose exposure the timestamp
   // refers. Without a value, all rows are exposed at once.
   std::optional<double> line_delay_s;
+  // Drift of the clock of the camera [s/s]: time_offset_s is the offset where
+  // the session begins (MotionSegment), and time_drift more each second later.
+  // Without a value, none.
+  std::optional<double> time_drift;
   int width_px = 0;  // of the image; constant, not estimated
   int height_px = 0;
 
@@ -89,8 +93,12 @@ bool Unproject(const CameraCalibration& camera,
                const Eigen::Vector2d& z_px,
                Eigen::Vector3d* bearing_C);
 
-// Time from the timestamp of an image to the exposure of its middle row [s].
-double MiddleRowDelay(const CameraCalibration& camera);
+// Offset of the clocks [s] a time after the session began.
+double TimeOffsetAt(const CameraCalibration& camera, double session_s);
+
+// Time from the timestamp of an image to the exposure of its middle row [s], a
+// time after the session began.
+double MiddleRowDelay(const CameraCalibration& camera, double session_s);
 
 // Scales along x and y in the middle of the image [px/rad], which are f for
 // most models.

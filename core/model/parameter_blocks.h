@@ -224,6 +224,15 @@ inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
       .group = "time",
       .words = "the time from one row to the next"},
      &CameraCalibration::line_delay_s},
+    {{.name = "time_drift",
+      .field = "time_drift",
+      .unit = "s/s",
+      .sigma_ref = 5e-4,
+      .prior_sigma = 1e-4,
+      .limit = 1e-2,
+      .group = "time",
+      .words = "the drift of the clock of the images"},
+     &CameraCalibration::time_drift},
 };
 
 template <class Value>

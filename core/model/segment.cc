@@ -18,6 +18,11 @@ KeyframeState BoxPlus(const KeyframeState& state,
   return moved;
 }
 
+double SessionTime(const MotionSegment& segment, const KeyframeState& x) {
+  if (!segment.session_start_ns) return 0;
+  return 1e-9 * static_cast<double>(x.t_ns - *segment.session_start_ns);
+}
+
 std::span<const ImuSample> SamplesFromFirstKeyframe(
     const MotionSegment& segment) {
   const std::vector<ImuSample>& imu = segment.imu;

@@ -89,7 +89,15 @@ struct MotionSegment {
                                           // (keyframe, camera, landmark)
   // Temperature of the device in degrees Celsius, if known.
   std::optional<double> temperature_c = std::nullopt;
+  // The time at which the session began, from which a drift of its clocks
+  // counts: the same for all of its segments. Needed by a calibration that has
+  // a time drift.
+  std::optional<std::int64_t> session_start_ns = std::nullopt;
 };
+
+// Time of a keyframe of the segment since its session began [s]; zero if that
+// is not known.
+double SessionTime(const MotionSegment& segment, const KeyframeState& x);
 
 // Samples from the last at or before the first keyframe to the first at or
 // after the last one. Neighbouring segments share at most the sample between
@@ -129,6 +137,7 @@ struct SegmentLimits {
   double pixel_margin_px = 1;  // outside the image
   double min_temperature_c = -100;
   double max_temperature_c = 200;
+  double max_session_s = 30 * 86400.0;  // from its begin to a keyframe
   int max_violations = 100;  // the list is truncated here; one more entry,
                              // without a field, reports that
 };

@@ -68,6 +68,47 @@ void CheckTemperature(const MotionSegment& segment,
                 "leave it out");
 }
 
+// Differences to keyframes do not overflow if the time is in range, and a
+// calibration whose clocks drift needs it.
+void CheckSessionStart(const MotionSegment& segment,
+                       const Calibration& theta,
+                       const SegmentLimits& limits,
+                       ViolationList* list) {
+  constexpr std::string_view kField = "session_start_ns";
+  if (!segment.session_start_ns) {
+    const bool drifts = std::any_of(
+        theta.cameras.begin(),
+        theta.cameras.end(),
+        [](const CameraCalibration& camera) { return camera.time_drift; });
+    if (drifts) {
+      list->Add(std::string(kField),
+                "is missing, and the rig has cameras with a time drift; send "
+                "the time at which the session began, the same for all of its "
+                "segments");
+    }
+    return;
+  }
+  const std::int64_t start_ns = *segment.session_start_ns;
+  if (!TimeInRange(start_ns)) {
+    list->Add(std::string(kField),
+              std::to_string(start_ns) + " ns is out of range");
+    return;
+  }
+  if (segment.keyframes.empty() ||
+      !TimeInRange(segment.keyframes.front().t_ns)) {
+    return;
+  }
+  const double age_s = Seconds(start_ns, segment.keyframes.front().t_ns);
+  if (segment.keyframes.front().t_ns < start_ns) {
+    list->Add(std::string(kField), "is later than the first keyframe");
+  } else if (age_s > limits.max_session_s) {
+    list->Add(std::string(kField),
+              "is " + std::to_string(age_s) +
+                  " s before the first keyframe; begin a new session when the "
+                  "clocks are set");
+  }
+}
+
 // Adds a violation and returns false if the list must not be inspected.
 bool CheckCount(std::string_view field,
                 std::size_t count,
@@ -327,6 +368,7 @@ std::vector<Violation> Validate(const MotionSegment& segment,
   ViolationList list(limits.max_violations);
   CheckKey(segment, &list);
   CheckTemperature(segment, limits, &list);
+  CheckSessionStart(segment, theta, limits, &list);
   const bool keyframes_counted = CheckCount("keyframes",
                                             segment.keyframes.size(),
                                             limits.min_keyframes,

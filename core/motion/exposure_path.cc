@@ -38,8 +38,9 @@ ExposurePath::ExposurePath(const Rig& rig,
   for (const KeyframeState& x : segment.keyframes) {
     keyframe_ns.push_back(x.t_ns);
     for (const CameraCalibration& camera : theta.cameras) {
-      exposure_ns.push_back(x.t_ns +
-                            std::llround(1e9 * MiddleRowDelay(camera)));
+      exposure_ns.push_back(
+          x.t_ns +
+          std::llround(1e9 * MiddleRowDelay(camera, SessionTime(segment, x))));
     }
   }
   std::vector<std::int64_t> times_ns = keyframe_ns;

@@ -84,7 +84,7 @@ class RowCollector {
                     theta_,
                     std::vector<char>(theta_.cameras.size(), 1),
                     segment.keyframes,
-                    [&](std::size_t) { return std::span(segment.imu); });
+                    [&](std::size_t k) { return ContextOf(segment, k); });
     std::vector<std::vector<const Observation*>> tracks(
         segment.landmarks.size());
     for (const Observation& o : segment.observations) {

@@ -36,6 +36,11 @@ GyroResult CheckGyro(const Calibration& theta,
                      const MotionData& data,
                      Diagnosis* diagnosis);
 
+// A time offset that grows with the time since a session began.
+void CheckClocks(const Calibration& theta,
+                 std::span<const MotionSegment> segments,
+                 Diagnosis* diagnosis);
+
 // Axes and units of the accelerometer, and gravity.
 void CheckAccelerometer(const Rig& rig,
                         const Calibration& theta,

@@ -10,7 +10,7 @@ namespace {
 
 // Whether the motion in the image can be predicted in spite of a finding.
 bool LeavesMotion(FindingKind kind) {
-  return kind == FindingKind::kTimeOffset ||
+  return kind == FindingKind::kTimeOffset || kind == FindingKind::kClockDrift ||
          kind == FindingKind::kDroppedSamples ||
          kind == FindingKind::kRepeatedSamples ||
          kind == FindingKind::kSaturation;
@@ -30,6 +30,8 @@ std::string_view FindingName(FindingKind kind) {
       return "gravity";
     case FindingKind::kTimeOffset:
       return "time-offset";
+    case FindingKind::kClockDrift:
+      return "clock-drift";
     case FindingKind::kDroppedSamples:
       return "dropped-samples";
     case FindingKind::kRepeatedSamples:
@@ -61,7 +63,9 @@ Diagnosis Diagnose(const Rig& rig,
   CheckSampling(segments, &diagnosis);
   CheckSaturation(segments, &diagnosis);
   const MotionData data = CollectMotion(segments);
+  diagnosis.session_s = data.session_s;
   const GyroResult gyro = CheckGyro(theta, data, &diagnosis);
+  CheckClocks(theta, segments, &diagnosis);
   CheckAccelerometer(rig, theta, data, gyro, &diagnosis);
   CheckReprojection(rig, theta, segments, &diagnosis);
   if (std::all_of(diagnosis.findings.begin(),

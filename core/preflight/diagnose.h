@@ -31,6 +31,7 @@ enum class FindingKind {
   kAccelUnits,       // accelerations not in m/s^2
   kGravity,          // wrong sign, removed, or G not level
   kTimeOffset,       // between the timestamps of keyframes and samples
+  kClockDrift,       // of the clocks of cameras and IMU
   kDroppedSamples,   // gaps in the IMU stream
   kRepeatedSamples,  // repeated readings or timestamps
   kSaturation,       // readings at the limit of the sensor's range
@@ -52,9 +53,9 @@ struct Finding {
   std::string cause;   // in words, with the figure that supports it
   std::string remedy;  // what to do about it
   // Measured value: the factor of a unit or a focal length, the offset [s], the
-  // time from the first to the last row [s], the share of samples that are
-  // dropped, repeated or saturated; otherwise the ratio of the error of the
-  // data as sent to that of the explanation.
+  // drift [s/s], the time from the first to the last row [s], the share of
+  // samples that are dropped, repeated or saturated; otherwise the ratio of the
+  // error of the data as sent to that of the explanation.
   double value = 0;
 };
 
@@ -62,6 +63,8 @@ struct Diagnosis {
   std::vector<Finding> findings;
   std::vector<std::string> checked;      // with the amount of data
   std::vector<std::string> not_checked;  // with the reason
+  // Mean time of the segments since their sessions began.
+  double session_s = 0;
 };
 
 // `segments` are of one rig; `theta` is the calibration that their SLAM system

@@ -57,6 +57,9 @@ MotionData CollectMotion(std::span<const MotionSegment> segments) {
     data.imu.push_back(UsableSamples(segment));
     if (data.imu.back().size() < 2) continue;
     CollectIntervals(segment.keyframes, data.imu.size() - 1, &all);
+    if (segment.keyframes.empty()) continue;
+    data.session_s += SessionTime(segment, segment.keyframes.front()) /
+                      static_cast<double>(segments.size());
   }
   const std::size_t step = all.size() / kMaxIntervals + 1;
   for (std::size_t i = 0; i < all.size(); i += step) {

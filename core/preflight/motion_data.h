@@ -26,6 +26,8 @@ struct MotionData {
   // Samples of each segment that are finite and later than the previous ones.
   std::vector<std::vector<ImuSample>> imu;
   std::vector<MotionInterval> intervals;
+  // Mean time of the segments since their sessions began.
+  double session_s = 0;
 };
 
 // Collects intervals of at least a quarter of a second, for which the relative

@@ -17,16 +17,19 @@ constexpr double kMaxRefinement_s = 2 * kCoarseStep_s;
 }  // namespace
 
 bool IsStatedOffset(const Calibration& theta,
+                    double session_s,
                     double offset_s,
                     double tolerance_s) {
   if (std::abs(offset_s) < tolerance_s) return true;
-  return std::any_of(
-      theta.cameras.begin(),
-      theta.cameras.end(),
-      [&](const CameraCalibration& camera) {
-        return std::abs(offset_s - camera.time_offset_s) < tolerance_s ||
-               std::abs(offset_s - MiddleRowDelay(camera)) < tolerance_s;
-      });
+  return std::any_of(theta.cameras.begin(),
+                     theta.cameras.end(),
+                     [&](const CameraCalibration& camera) {
+                       const double first_s = TimeOffsetAt(camera, session_s);
+                       const double middle_s =
+                           MiddleRowDelay(camera, session_s);
+                       return std::abs(offset_s - first_s) < tolerance_s ||
+                              std::abs(offset_s - middle_s) < tolerance_s;
+                     });
 }
 
 std::optional<TimeOffset> EstimateTimeOffset(

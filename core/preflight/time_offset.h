@@ -42,9 +42,10 @@ std::optional<TimeOffset> EstimateTimeOffset(
 inline constexpr double kLeastTimeOffset_s = 5e-3;
 
 // Returns whether a calibration explains states that hold this much later than
-// their stamps: those of the IMU's clock, or of the first or the middle row of
-// the images of a camera.
+// their stamps, about this time after the session began: those of the IMU's
+// clock, or of the first or the middle row of the images of a camera.
 bool IsStatedOffset(const Calibration& theta,
+                    double session_s,
                     double offset_s,
                     double tolerance_s);
 

@@ -41,40 +41,52 @@ class Exposures {
   std::vector<Camera> cameras_;
 };
 
-// Delay [s] of the instants to which the states of a SLAM system refer,
-// relative to the keyframes: its poses follow the middle of the images, and it
-// assumes other time offsets and line delays. Mean over the cameras.
+// Times [s] of the keyframes since the session began, which was age_s before
+// the trajectory.
+std::vector<double> SessionTimes(const std::vector<KeyframeState>& keyframes,
+                                 double age_s);
+
+// Delay [s] of the instant to which the state of a SLAM system refers, relative
+// to its keyframe, session_s after the session began: its poses follow the
+// middle of the images, and it assumes other time offsets, drifts and line
+// delays. Mean over the cameras.
 double KeyframeDelay(const Calibration& theta_true,
-                     const Calibration& theta_slam);
+                     const Calibration& theta_slam,
+                     double session_s);
 
 // The largest time by which any of these is before, or after, its keyframe.
 struct TimeMargins {
   double before_s = 0;
   double after_s = 0;
 };
+// At any time of a trajectory, which begins age_s after the session.
 TimeMargins ExposureMargins(const Calibration& theta_true,
-                            const Calibration& theta_slam);
+                            const Calibration& theta_slam,
+                            double age_s,
+                            double duration_s);
 
-// The true states dt_s later, with the times of the keyframes.
+// The true states dt_s later, each its own, with the times of the keyframes.
 std::vector<KeyframeState> StatesLater(
     const std::vector<KeyframeState>& keyframes,
     const Trajectory& trajectory,
     const ImuReadings& imu,
-    double dt_s);
+    const std::vector<double>& dt_s);
 
 // All but theta_true must outlive the result.
 Exposures TrueExposures(const Calibration& theta_true,
                         const std::vector<KeyframeState>& keyframes,
+                        const std::vector<double>& session_s,
                         const Trajectory& trajectory,
                         const ImuReadings& imu);
 
 // Exposures computed from the states of the SLAM system, which estimate the
-// true states `meant`, `delay_s` after those of the keyframes; between these
+// true states `meant`, `delays_s` after those of the keyframes; between these
 // times the body moves as in truth. All but theta_slam must outlive the result.
 Exposures SlamExposures(const Calibration& theta_slam,
                         const std::vector<KeyframeState>& slam_states,
                         const std::vector<KeyframeState>& meant,
-                        double delay_s,
+                        const std::vector<double>& session_s,
+                        const std::vector<double>& delays_s,
                         const Trajectory& trajectory,
                         const ImuReadings& imu);
 

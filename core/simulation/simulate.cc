@@ -171,14 +171,18 @@ SimulatedSession Simulate(const Rig& rig,
                           const SimulationOptions& options) {
   Recording recording;
   recording.imu = SimulateImu(rig, theta_true.imu, trajectory, options);
-  TimeMargins margins = ExposureMargins(theta_true, theta_slam);
+  TimeMargins margins = ExposureMargins(
+      theta_true, theta_slam, options.session_age_s, trajectory.duration_s());
   margins.after_s += options.exposure_s;
   recording.truth = TrueKeyframes(trajectory, recording.imu, margins, options);
   const int N = options.keyframes_per_segment;
   const int segments = static_cast<int>(recording.truth.size()) / N;
   recording.truth.resize(static_cast<std::size_t>(segments) * N);
+  const std::vector<double> session_s =
+      SessionTimes(recording.truth, options.session_age_s);
   const auto exposures = [&](const Calibration& theta) {
-    return TrueExposures(theta, recording.truth, trajectory, recording.imu);
+    return TrueExposures(
+        theta, recording.truth, session_s, trajectory, recording.imu);
   };
   recording.tracks =
       SimulateTracks(theta_true,
@@ -187,9 +191,12 @@ SimulatedSession Simulate(const Rig& rig,
                      exposures(theta_true),
                      options,
                      exposures(ShutterClosed(theta_true, options)));
-  const double delay_s = KeyframeDelay(theta_true, theta_slam);
+  std::vector<double> delays_s;
+  for (const double s : session_s) {
+    delays_s.push_back(KeyframeDelay(theta_true, theta_slam, s));
+  }
   const std::vector<KeyframeState> meant =
-      StatesLater(recording.truth, trajectory, recording.imu, delay_s);
+      StatesLater(recording.truth, trajectory, recording.imu, delays_s);
   recording.slam =
       SlamStates(meant, recording.imu, theta_true.imu, theta_slam.imu, options);
   recording.slam_landmarks_G =
@@ -197,7 +204,8 @@ SimulatedSession Simulate(const Rig& rig,
                            SlamExposures(theta_slam,
                                          recording.slam,
                                          meant,
-                                         delay_s,
+                                         session_s,
+                                         delays_s,
                                          trajectory,
                                          recording.imu),
                            recording.tracks,
@@ -208,6 +216,7 @@ SimulatedSession Simulate(const Rig& rig,
   for (int s = 0; s < segments; ++s) {
     MotionSegment segment;
     segment.key = {session, s};
+    segment.session_start_ns = std::llround(-1e9 * options.session_age_s);
     MotionSegment truth = segment;
     const int end = (s + 1) * N;
     const int imu_end = s + 1 < segments ? end : end - 1;

@@ -58,6 +58,8 @@ struct SimulationOptions {
   // Time before its first and after its last keyframe of which a segment has
   // the samples, within the trajectory: there none is lost.
   double imu_padding_s = kImuPadding_s;
+  // Time from the begin of the session to that of the trajectory.
+  double session_age_s = 0;
   // Errors of the SLAM system, one standard deviation. Most of each drifts
   // slowly, a small part is independent in every keyframe.
   double slam_rotation_rad = 2e-3;  // roll and pitch; yaw drifts 3 times as far
@@ -89,7 +91,8 @@ struct SimulatedSession {
 // the time of their keyframe by the true time offset of their camera, and the
 // rows of a rolling shutter one after the other; if the SLAM system assumes
 // other offsets and line delays, its states are those at the middle of its
-// images rather than those of the IMU.
+// images rather than those of the IMU. A time offset drifts from the begin of
+// the session.
 //
 // Segments of keyframes_per_segment fill the trajectory from its start;
 // remaining keyframes at the end that do not fill a segment are dropped. Times

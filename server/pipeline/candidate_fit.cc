@@ -221,8 +221,10 @@ bool Biases(const CheckContext& context, const Finding& finding) {
       return false;
     case FindingKind::kTimeOffset:
       return !EstimatesTimeOffset(context.rig) &&
-             !IsStatedOffset(
-                 context.result.theta, finding.value, kLeastTimeOffset_s);
+             !IsStatedOffset(context.result.theta,
+                             context.evidence.diagnosis->session_s,
+                             finding.value,
+                             kLeastTimeOffset_s);
     default:
       return true;
   }

@@ -1,7 +1,7 @@
 // Models of sensors: one, two and four cameras, whose clocks are off from that
-// of the IMU; rolling shutters; a camera of each model; gyroscopes that react
-// to acceleration; accelerometers whose axes lie apart. What a model adds is
-// known, estimated, and ignored.
+// of the IMU, or drift; rolling shutters; a camera of each model; gyroscopes
+// that react to acceleration; accelerometers whose axes lie apart. What a model
+// adds is known, estimated, and ignored.
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdint>
@@ -41,6 +41,7 @@ struct Setting {
   Rig rig;
   Calibration truth;
   bool ignored = false;
+  double apart_s = 0;  // from one segment to the next; 0: of one motion
 };
 
 Setting OffsetSetting(int cameras, Effect effect) {
@@ -73,6 +74,29 @@ Setting RollingSetting(int readout_ms, Effect effect) {
   }
   if (effect == Effect::kEstimated) {
     setting.rig.factory.cameras[0].line_delay_s = 0;
+  }
+  setting.ignored = effect == Effect::kIgnored;
+  return setting;
+}
+
+// A clock that drifts by 50 parts in a million, over six segments within eight
+// minutes of a session, and an unknown time offset.
+Setting DriftSetting(Effect effect) {
+  Setting setting;
+  setting.name = "drift_" + EffectName(effect);
+  setting.seed = 5000;
+  setting.apart_s = 100;
+  setting.rig = RigOfCameras(1);
+  setting.truth = setting.rig.factory;
+  setting.truth.cameras[0].time_offset_s = 0.004;
+  setting.truth.cameras[0].time_drift = 5e-5;
+  setting.rig.blocks = {{"*.time_offset", true}};
+  if (effect == Effect::kKnown) {
+    setting.rig.factory = setting.truth;
+    setting.rig.blocks.push_back({"*.time_drift", false});
+  }
+  if (effect == Effect::kEstimated) {
+    setting.rig.factory.cameras[0].time_drift = 0;
   }
   setting.ignored = effect == Effect::kIgnored;
   return setting;
@@ -147,6 +171,7 @@ std::vector<Setting> Settings() {
     }
   }
   for (const Effect effect : kEffects) {
+    settings.push_back(DriftSetting(effect));
     settings.push_back(GSensitivitySetting(effect));
     settings.push_back(AccelPositionSetting(effect));
   }
@@ -176,14 +201,18 @@ std::optional<Run> RunOne(const Setting& setting,
   SimulationOptions options;
   options.seed = seed;
   options.landmarks_in_view = 60;
-  const SimulatedSession session = Simulate(rig,
-                                            setting.truth,
-                                            rig.factory,
-                                            *MakeHandheld(duration_s, 1, seed),
-                                            "session",
-                                            options);
+  const std::vector<MotionSegment> segments =
+      setting.apart_s > 0
+          ? SimulateApart(rig, setting.truth, 6, setting.apart_s, options)
+          : Simulate(rig,
+                     setting.truth,
+                     rig.factory,
+                     *MakeHandheld(duration_s, 1, seed),
+                     "session",
+                     options)
+                .segments;
   const CalibrationResult result =
-      Calibrate(rig, rig.factory, session.segments, ComparedOptions());
+      Calibrate(rig, rig.factory, segments, ComparedOptions());
   if (result.status != CalibrateStatus::kConverged && !setting.ignored) {
     return std::nullopt;
   }
@@ -197,6 +226,7 @@ std::optional<Run> RunOne(const Setting& setting,
     if (!rig.factory.cameras[j].line_delay_s) {
       truth.cameras[j].line_delay_s.reset();
     }
+    if (!rig.factory.cameras[j].time_drift) truth.cameras[j].time_drift.reset();
   }
   Run run;
   run.error = BoxMinus(result.theta, truth);
@@ -264,6 +294,7 @@ struct Block {
 constexpr Block kBlocks[] = {
     {"time offset [ms]", "*.time_offset", 1e-3},
     {"line delay [us]", "*.line_delay", 1e-6},
+    {"drift [us/s]", "*.time_drift", 1e-6},
     {"q_CI [mrad]", "*.q_CI.*", 1e-3},
     {"p_CI [mm]", "*.p_CI.*", 1e-3},
     {"f [px]", "*.focal.*", 1},

@@ -55,6 +55,8 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
     ASSERT_EQ(x.line_delay_s.has_value(), y.line_delay_s.has_value());
     EXPECT_TRUE(
         SameBits(x.line_delay_s.value_or(0), y.line_delay_s.value_or(0)));
+    ASSERT_EQ(x.time_drift.has_value(), y.time_drift.has_value());
+    EXPECT_TRUE(SameBits(x.time_drift.value_or(0), y.time_drift.value_or(0)));
   }
 }
 
@@ -94,6 +96,7 @@ void ExpectSame(const MotionSegment& a, const MotionSegment& b) {
   EXPECT_EQ(a.key, b.key);
   EXPECT_EQ(a.calibration_version, b.calibration_version);
   EXPECT_EQ(a.temperature_c, b.temperature_c);
+  EXPECT_EQ(a.session_start_ns, b.session_start_ns);
   ASSERT_EQ(a.keyframes.size(), b.keyframes.size());
   for (std::size_t k = 0; k < a.keyframes.size(); ++k) {
     const KeyframeState& x = a.keyframes[k];
@@ -273,6 +276,7 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   Rig given = random.RigValue();
   given.factory.cameras.resize(1, random.Camera());
   given.factory.cameras[0].line_delay_s.reset();
+  given.factory.cameras[0].time_drift.reset();
   v1::Rig message = ToProto(given);
   message.clear_gravity_mps2();
   message.clear_groups();

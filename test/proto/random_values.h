@@ -59,6 +59,7 @@ class RandomValues {
     camera.height_px = Int(0, 10000);
     camera.time_offset_s = Double();
     if (Int(0, 1) == 1) camera.line_delay_s = Double();
+    if (Int(0, 1) == 1) camera.time_drift = Double();
     return camera;
   }
 
@@ -114,6 +115,7 @@ class RandomValues {
     segment.key = {Text(Int(1, 20)), Int64()};
     segment.calibration_version = Int(1, 1000);
     if (Int(0, 1) == 1) segment.temperature_c = Double();
+    if (Int(0, 1) == 1) segment.session_start_ns = Int(-1000, 1000);
     for (int i = Int(0, 20); i > 0; --i) {
       segment.keyframes.push_back(
           {Int64(), Quaternion(), Vector3(), Vector3(), Vector3(), Vector3()});

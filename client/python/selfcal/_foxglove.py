@@ -253,6 +253,12 @@ def losses(calibration: v1.CalibrationParameters) -> list[str]:
                 f"cam{number}: the line delay of {camera.line_delay_s:g} s is "
                 "not included; all rows of an image have its timestamp"
             )
+        if camera.HasField("time_drift"):
+            lost.append(
+                f"cam{number}: the drift of its clock by "
+                f"{camera.time_drift:g} s each second is not included; images "
+                "keep their own timestamps"
+            )
     scales = calibration.imu
     if any(
         value != nominal

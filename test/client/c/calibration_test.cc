@@ -43,6 +43,7 @@ Calibration Theta() {
   second.distortion = Eigen::Vector4d(0.1, -0.05, 0.001, 0.002);
   second.f = {500, 510};
   second.line_delay_s = 3e-5;
+  second.time_drift = 2e-5;
   return theta;
 }
 
@@ -135,6 +136,8 @@ TEST_F(CalibrationTest, HasTheValuesThatWerePublished) {
     EXPECT_EQ(camera.time_offset_s, 0.004);
     EXPECT_EQ(camera.rolling_shutter, j == 1 ? 1 : 0);
     EXPECT_EQ(camera.line_delay_s, j == 1 ? 3e-5 : 0);
+    EXPECT_EQ(camera.clock_drifts, j == 1 ? 1 : 0);
+    EXPECT_EQ(camera.time_drift, j == 1 ? 2e-5 : 0);
   }
 }
 

@@ -65,6 +65,7 @@ TEST(Layout, OfOptions) {
   EXPECT_MEMBER(selfcal_builder_options, gravity_mps2, 64, 8);
   EXPECT_MEMBER(selfcal_builder_options, same_ids_after_gap, 72, 4);
   EXPECT_MEMBER(selfcal_builder_options, reserved, 76, 4);
+  EXPECT_MEMBER(selfcal_builder_options, session_start_ns, 80, 8);
   EXPECT_EQ(c::kBuilderOptionsSize, 80u);
 
   EXPECT_MEMBER(selfcal_client_options, struct_size, 0, 4);
@@ -151,6 +152,8 @@ TEST(Layout, OfTheCalibration) {
   EXPECT_MEMBER(selfcal_camera, time_offset_s, 176, 8);
   EXPECT_MEMBER(selfcal_camera, rolling_shutter, 184, 4);
   EXPECT_MEMBER(selfcal_camera, line_delay_s, 192, 8);
+  EXPECT_MEMBER(selfcal_camera, clock_drifts, 200, 4);
+  EXPECT_MEMBER(selfcal_camera, time_drift, 208, 8);
   EXPECT_EQ(c::kCameraSize, 184u);
 
   EXPECT_MEMBER(selfcal_component, struct_size, 0, 4);

@@ -46,7 +46,7 @@ TEST_F(PreflightCommand, FindsNothingWrongInARecording) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   EXPECT_THAT(outcome.out, StartsWith("checked\tdropped and repeated samples"));
-  EXPECT_EQ(std::count(outcome.out.begin(), outcome.out.end(), '\n'), 6);
+  EXPECT_EQ(std::count(outcome.out.begin(), outcome.out.end(), '\n'), 7);
 }
 
 TEST_F(PreflightCommand, NamesWhatIsWrongAndExitsWithOne) {
@@ -74,7 +74,7 @@ TEST_F(PreflightCommand, PrintsOneDocumentOfJson) {
   EXPECT_NEAR(finding.at("value").number_value(), 0.5, 1e-3);
   EXPECT_NE(finding.at("cause").string_value(), "");
   EXPECT_NE(finding.at("remedy").string_value(), "");
-  EXPECT_EQ(fields.at("checked").list_value().values_size(), 5);
+  EXPECT_EQ(fields.at("checked").list_value().values_size(), 6);
   // The shutter, before the focal length is correct.
   EXPECT_EQ(fields.at("not_checked").list_value().values_size(), 1);
 }

@@ -252,6 +252,7 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
   rig.factory.cameras[1].time_offset_s = 0.004;
   rig.factory.cameras[2].time_offset_s = 0.003;
   rig.factory.cameras[1].line_delay_s = 3e-5;
+  rig.factory.cameras[1].time_drift = 2e-5;
   const auto files = ExportRig(format, rig, rig.factory, {});
   ASSERT_TRUE(files.ok()) << files.status();
   const std::vector<std::string> names = Names(files->losses);
@@ -265,6 +266,7 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
             !GetParam().time_offset && GetParam().cameras > 2);
   EXPECT_EQ(named("cam1.line_delay"), format != "maplab");
   EXPECT_FALSE(named("cam0.line_delay"));
+  EXPECT_TRUE(named("cam1.time_drift"));
   EXPECT_EQ(named("cam2"), GetParam().cameras < 3);
   EXPECT_EQ(named("cam0.extrinsics"), !GetParam().poses);
   EXPECT_EQ(named("imu_noise"), !GetParam().noise);

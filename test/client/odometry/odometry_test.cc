@@ -2,20 +2,25 @@
 // faults.
 #include "client/odometry/odometry.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <opencv2/core.hpp>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "client/tracking/feature_tracker.h"
 #include "core/calibration/calibrate.h"
 #include "core/calibration/theta_prior.h"
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
 #include "test/rendering/rendered_source.h"
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
@@ -78,7 +83,7 @@ class Source : public Recording {
   const Faults faults_;
 };
 
-std::vector<OdometrySegment> All(Source* source,
+std::vector<OdometrySegment> All(Recording* source,
                                  const OdometryOptions& options) {
   const Rig rig = HandheldRig("handheld");
   Odometry odometry(source, rig, rig.factory, options);
@@ -131,6 +136,58 @@ TEST(Odometry, FindsTheMotionOfARecording) {
     EXPECT_GE(segments[i - 1].segment.imu.back().t_ns, next.t_ns);
     const KeyframeState& last = segments[i - 1].segment.keyframes.back();
     EXPECT_LT((next.p_GI - last.p_GI).norm(), 0.3);
+  }
+}
+
+// A folder of the points that a tracker finds in the images gives the segments
+// of the images.
+TEST(Odometry, TakesTheTracksOfARecordingWithoutImages) {
+  Source source;
+  FeatureTracker tracker(Rendered().rig().factory, {});
+  for (const ImuSample& sample : source.imu()) tracker.AddImu(sample);
+  std::string tracks = "time,camera,landmark,x,y\n";
+  for (int i = 0; i < Rendered().images(); ++i) {
+    GreyPixels pixels = *source.ReadImage(0, i);
+    const cv::Mat image(
+        pixels.height_px, pixels.width_px, CV_8UC1, pixels.pixels.data());
+    for (const TrackPoint& point :
+         tracker.Track(Rendered().stamp_ns(i), {image})) {
+      tracks += fmt::format("{},0,{},{},{}\n",
+                            Rendered().stamp_ns(i),
+                            point.landmark,
+                            point.z_px.x(),
+                            point.z_px.y());
+    }
+  }
+  std::string imu;
+  for (const ImuSample& sample : source.imu()) {
+    imu += fmt::format("{},{},{},{},{},{},{}\n",
+                       sample.t_ns,
+                       sample.gyro.x(),
+                       sample.gyro.y(),
+                       sample.gyro.z(),
+                       sample.accel.x(),
+                       sample.accel.y(),
+                       sample.accel.z());
+  }
+  const TempFolder folder(FolderInMemory());
+  WriteBytes(folder.File("tracks.csv"), tracks);
+  WriteBytes(folder.File("imu.csv"), imu);
+  const auto recording = OpenRecording(folder.path(), {});
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  const OdometryOptions options = {.session = "walk", .keyframes = 30};
+  const auto of_images = All(&source, options);
+  const auto of_tracks = All(recording->get(), options);
+  ASSERT_EQ(of_images.size(), 3u);
+  ASSERT_EQ(of_tracks.size(), of_images.size());
+  for (std::size_t i = 0; i < of_images.size(); ++i) {
+    const MotionSegment& a = of_images[i].segment;
+    const MotionSegment& b = of_tracks[i].segment;
+    ASSERT_EQ(a.observations.size(), b.observations.size());
+    ASSERT_EQ(a.keyframes.size(), b.keyframes.size());
+    for (std::size_t k = 0; k < a.keyframes.size(); ++k) {
+      EXPECT_LT((a.keyframes[k].p_GI - b.keyframes[k].p_GI).norm(), 1e-9);
+    }
   }
 }
 

@@ -380,6 +380,13 @@ TEST_F(RegularStream, GivesEachSegmentTheTemperatureThatIsKnown) {
   EXPECT_EQ(builder_.Take()->temperature_c, std::nullopt);
 }
 
+TEST_F(RegularStream, StatesWhereTheSessionBegan) {
+  AddImuUntil(2000);
+  for (int k = 1; k < 13; ++k) AddKeyframe(100 * k);
+  EXPECT_EQ(builder_.Take()->session_start_ns, 100'000'000);
+  EXPECT_EQ(builder_.Take()->session_start_ns, 100'000'000);
+}
+
 TEST_F(RegularStream, IgnoresATemperatureThatTheDaemonWouldNotAccept) {
   EXPECT_TRUE(builder_.SetTemperature(36.6));
   for (const double c : {293.15,

@@ -122,7 +122,12 @@ TEST_F(TrackPositions, AreThoseOfTheExposures) {
     tracks[o.landmark].observations.push_back({o.keyframe, o.camera, o.z_px});
   }
   const auto positions = TriangulateTracks(
-      theta, truth.keyframes, truth.imu, tracks, kSigma_px, kGravity_mps2);
+      theta,
+      truth.keyframes,
+      std::vector<KeyframeContext>(truth.keyframes.size(), {truth.imu}),
+      tracks,
+      kSigma_px,
+      kGravity_mps2);
   int found = 0;
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!positions[i]) continue;

@@ -108,6 +108,35 @@ TEST_P(RollingShutter, IsFoundWithItsLineDelay) {
   });
 }
 
+// Drifts of 20 and 100 parts in a million, of a rig that believes in none: five
+// minutes after the session began, clocks are 6 and 30 ms apart.
+class ClockDrift : public testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(Drifts, ClockDrift, testing::Values(20, -100));
+
+TEST_P(ClockDrift, IsFoundWithTheTimeOffset) {
+  Calibration truth = RigOfCameras(1).factory;
+  truth.cameras[0].time_offset_s = 0.004;
+  truth.cameras[0].time_drift = 1e-6 * GetParam();
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = RigOfCameras(1);
+    rig.factory.cameras[0].time_drift = 0;
+    rig.factory = PerturbCalibration(rig.factory, {}, seed);
+    rig.blocks = {{"*.time_offset", true}};
+    rig.groups = DefaultGroups(rig.blocks, rig.factory);
+    const Errors errors =
+        CalibrateSimulated(rig, truth, seed, {.apart_s = 100});
+    const auto last = errors.error.size() - 1;
+    const double sigma = std::sqrt(errors.covariance(last, last));
+    std::printf("drift: %.2f us/s off, sigma %.2f us/s\n",
+                1e6 * errors.error(last),
+                1e6 * sigma);
+    EXPECT_LT(std::abs(errors.error(last)), 3.3 * sigma);
+    EXPECT_LT(sigma, 2e-6);
+    return errors;
+  });
+}
+
 // Other parameters of the same rig are known equally well, and estimated as
 // well.
 TEST(FreeParameters, AreThoseThatTheRigChooses) {

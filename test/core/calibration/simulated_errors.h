@@ -14,6 +14,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
+#include "test/core/simulation/rigs.h"
 
 namespace selfcal {
 
@@ -33,6 +34,9 @@ struct Errors {
 struct SessionKind {
   int landmarks_in_view = 60;
   int undetermined = 0;  // directions that the session does not determine
+  // If not zero, this much time passes from one of its four segments to the
+  // next.
+  double apart_s = 0;
 };
 
 // `rig` has the factory calibration; `truth` is the true one, and `expected`
@@ -46,11 +50,17 @@ inline Errors CalibrateSimulated(const Rig& rig,
   options.seed = seed;
   options.landmarks_in_view = kind.landmarks_in_view;
   options.keyframes_per_segment = 30;
-  const SimulatedSession session = Simulate(
-      rig, truth, rig.factory, *MakeHandheld(12.5, 1, seed), "s", options);
-  EXPECT_EQ(session.segments.size(), 4u);
-  const CalibrationResult result =
-      Calibrate(rig, rig.factory, session.segments);
+  const std::vector<MotionSegment> segments =
+      kind.apart_s > 0 ? SimulateApart(rig, truth, 4, kind.apart_s, options)
+                       : Simulate(rig,
+                                  truth,
+                                  rig.factory,
+                                  *MakeHandheld(12.5, 1, seed),
+                                  "s",
+                                  options)
+                             .segments;
+  EXPECT_EQ(segments.size(), 4u);
+  const CalibrationResult result = Calibrate(rig, rig.factory, segments);
   EXPECT_EQ(result.status, CalibrateStatus::kConverged)
       << "seed " << seed << ": " << result.message;
   const std::vector<int> free = FreeComponents(rig);

@@ -121,7 +121,7 @@ TEST(MeasureMotion, MovesThePoseToEachRowOfARollingShutter) {
       camera.time_offset_s = random.Uniform(-0.03, 0.03);
       camera.line_delay_s = readout_s / camera.height_px;
       const KeyframeMotion motion = MeasureMotion(
-          scene.samples, scene.x, scene.imu, {}, kGravity, camera);
+          {scene.samples}, scene.x, scene.imu, {}, kGravity, camera);
       for (const double row_px : {0.0, 100.5, 240.0, 333.0, 479.0}) {
         const double dt_s =
             camera.time_offset_s + *camera.line_delay_s * row_px;
@@ -257,7 +257,9 @@ TEST(KeyframeMotions, AreOfTheCamerasThatNeedThem) {
   }
   theta.cameras[2].time_offset_s = 0.01;
   const std::vector<KeyframeState> keyframes = {scene.x, scene.x};
-  const auto samples = [&](std::size_t) { return std::span(scene.samples); };
+  const auto samples = [&](std::size_t k) {
+    return KeyframeContext{scene.samples, 10.0 * static_cast<double>(k)};
+  };
   KeyframeMotions motions;
   const std::vector<char> second = {0, 1, 0};
   motions.Measure(Rig(), theta, second, keyframes, samples);
@@ -268,6 +270,12 @@ TEST(KeyframeMotions, AreOfTheCamerasThatNeedThem) {
     ASSERT_NE(motions.At(k, 2), nullptr);
     EXPECT_EQ(motions.At(k, 2)->dt_s, 0.01);
   }
+  theta.cameras[2].time_drift = 1e-3;
+  motions.Measure(Rig(), theta, second, keyframes, samples);
+  EXPECT_EQ(motions.At(0, 2)->dt_s, 0.01);
+  EXPECT_DOUBLE_EQ(motions.At(1, 2)->dt_s, 0.02);
+  EXPECT_EQ(motions.At(1, 2)->session_s, 10);
+  theta.cameras[2].time_drift.reset();
   theta.cameras[2].time_offset_s = 0;
   const std::vector<char> none = {0, 0, 0};
   motions.Measure(Rig(), theta, none, keyframes, samples);

@@ -53,7 +53,8 @@ Scene RandomScene(RandomValues& random,
                   DistortionModel model,
                   int count,
                   bool moves,
-                  bool rolling) {
+                  bool rolling,
+                  bool drifts) {
   Scene scene;
   scene.keyframe.q_GI = random.Rotation();
   scene.keyframe.p_GI = random.Normal3(5);
@@ -61,6 +62,8 @@ Scene RandomScene(RandomValues& random,
   scene.camera.time_offset_s = random.Uniform(-0.03, 0.03);
   if (moves) scene.motion = random.Motion();
   if (rolling) scene.camera.line_delay_s = moves ? 6e-5 : -4e-5;
+  if (drifts) scene.camera.time_drift = random.Uniform(-1e-4, 1e-4);
+  if (drifts && moves) scene.motion->session_s = random.Uniform(0, 100);
   for (int i = 0; i < count; ++i) {
     const double depth = random.Uniform(0, 1) < 0.1 ? -1 : random.Uniform(1, 9);
     const Eigen::Vector3d p_C(depth * random.Uniform(-0.7, 0.7),
@@ -86,9 +89,13 @@ void ForRandomScenes(unsigned seed, const Check& check) {
   RandomValues random(seed);
   for (const DistortionModel model : DistortionModels()) {
     for (const int count : {1, 2, 3, 7, 8, 9, 50}) {
-      for (const int kind : {0, 1, 2, 3}) {
-        const Scene scene =
-            RandomScene(random, model, count, kind % 2 == 1, kind > 1);
+      for (int kind = 0; kind < 8; ++kind) {
+        const Scene scene = RandomScene(random,
+                                        model,
+                                        count,
+                                        (kind & 1) != 0,
+                                        (kind & 2) != 0,
+                                        (kind & 4) != 0);
         for (const VectorWidth width : Widths()) {
           SCOPED_TRACE(VectorWidthName(width));
           check(scene, ReprojectionBatch(width), random);

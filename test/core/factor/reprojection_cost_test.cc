@@ -55,6 +55,9 @@ View RandomView(RandomValues& random) {
   // The last camera has a rolling shutter. Its observations are in the first
   // rows, which move little with a step of the line delay.
   view.reference.cameras.back().line_delay_s = 5e-5;
+  // The first one has a clock that drifts, shortly after a session began.
+  view.reference.cameras.front().time_drift = 2e-5;
+  if (view.motion) view.motion->session_s = 0.7;
   if (view.camera + 1 == std::ssize(view.reference.cameras)) {
     view.z_px.y() *= 0.01;
   }

@@ -123,9 +123,12 @@ void ExpectJacobiansMatch(const View& view) {
   };
   const int camera_size = CameraTangentSize(view.camera);
   ASSERT_EQ(J.camera.cols(), camera_size);
-  // Hundreds of rows multiply a step of the line delay.
+  // Hundreds of rows multiply a step of the line delay, and hundreds of seconds
+  // one of the drift.
   VectorXd camera_unit = VectorXd::Ones(camera_size);
-  if (view.camera.line_delay_s) camera_unit.tail<1>().setConstant(2e-3);
+  const int optional =
+      (view.camera.line_delay_s ? 1 : 0) + (view.camera.time_drift ? 1 : 0);
+  camera_unit.tail(optional).setConstant(2e-3);
   EXPECT_LT(
       RowwiseDifference(J.pose, numeric(Argument::kPose, VectorXd::Ones(6))),
       kTolerance);
@@ -175,6 +178,8 @@ TEST_P(ReprojectionOfEachModel, JacobiansMatchDifferencesAtRandomStates) {
     View view = RandomView(random, GetParam());
     if (trial % 2 == 0) view.motion = random.Motion();
     if (trial % 3 == 0) view.camera.line_delay_s = 1e-5 * (trial % 13 - 6);
+    if (trial % 5 < 2) view.camera.time_drift = 1e-5 * (trial % 7 - 3);
+    if (view.motion) view.motion->session_s = trial % 300;
     Vector3d bearing_C;
     if (!HasRoom(view) || !Unproject(view.camera, view.z_px, &bearing_C)) {
       continue;

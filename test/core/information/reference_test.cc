@@ -41,12 +41,14 @@ std::vector<Case> TimeOffsetCases() {
     if (seed == 7) c.rig.fixed = {"cam0.time_offset"};
     if (seed > 7) c.rig.factory.cameras[1].line_delay_s = 6e-5;
     if (seed > 8) c.rig.factory.cameras[0].line_delay_s = -2e-5;
+    if (seed > 7) c.rig.factory.cameras[0].time_drift = 3e-5;
     c.rig.groups = DefaultGroups(c.rig.blocks, c.rig.factory);
     c.theta0 = PerturbCalibration(c.rig.factory, {}, seed);
     if (seed == 6) c.theta0.cameras[1].time_offset_s -= 0.002;
     SimulationOptions options;
     options.seed = seed;
     options.keyframes_per_segment = 20;
+    if (seed > 7) options.session_age_s = 100;
     c.segment =
         OneSegment(c.rig, c.theta0, *MakeHandheld(2.2, 1, seed), options).slam;
     c.gauge = static_cast<int>(seed) - 5;

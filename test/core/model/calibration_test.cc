@@ -149,6 +149,30 @@ TEST(Calibration, ABlockThatACameraLacksHasNoComponents) {
   EXPECT_EQ(violations[0].field, "cameras[1].line_delay_s");
 }
 
+TEST(OptionalBlocks, TheDriftOfAClockFollowsALineDelay) {
+  RandomValues random(14);
+  Calibration theta = random.Theta();
+  theta.cameras[0].time_drift = 2e-5;
+  theta.cameras[1].line_delay_s = 3e-5;
+  theta.cameras[1].time_drift = -1e-5;
+  const auto components = TangentComponents(theta);
+  const int first = TimeOffsetComponent(theta, 0) + 1;
+  const int second = TimeOffsetComponent(theta, 1) + 2;
+  EXPECT_EQ(components[first].name, "cam0.time_drift");
+  EXPECT_EQ(components[first].unit, "s/s");
+  EXPECT_EQ(components[second].name, "cam1.time_drift");
+  EXPECT_EQ(second, CameraTangentOffset(theta, 2) - 1);
+  const Eigen::VectorXd delta = random.Vector(TangentSize(theta), 1e-5);
+  const Calibration moved = BoxPlus(theta, delta);
+  EXPECT_EQ(moved.cameras[1].time_drift, -1e-5 + delta[second]);
+  EXPECT_EQ(TimeOffsetAt(theta.cameras[0], 500),
+            theta.cameras[0].time_offset_s + 0.01);
+  theta.cameras[0].time_drift = 0.02;
+  const auto violations = Validate(theta, "");
+  ASSERT_EQ(violations.size(), 1u);
+  EXPECT_EQ(violations[0].field, "cameras[0].time_drift");
+}
+
 Calibration Coupled(int positions, RandomValues* random) {
   Calibration theta = random->Theta();
   theta.imu.gyro_g_sensitivity = random->Vector(9, 1e-3);

@@ -232,6 +232,31 @@ TEST(ValidateSegment, TemperatureIsThatOfADeviceOrUnknown) {
   EXPECT_THAT(Validate(segment, Theta()), IsEmpty());
 }
 
+TEST(ValidateSegment, ClocksThatDriftNeedTheBeginOfTheSession) {
+  MotionSegment segment = ValidSegment();
+  Calibration theta = Theta();
+  const auto expect = [&](const char* part) {
+    const std::vector<Violation> violations = Validate(segment, theta);
+    ASSERT_EQ(violations.size(), 1u) << part;
+    EXPECT_EQ(violations[0].field, "session_start_ns");
+    EXPECT_THAT(violations[0].message, testing::HasSubstr(part));
+  };
+  theta.cameras[0].time_drift = 1e-5;
+  expect("is missing");
+  const std::int64_t first_ns = segment.keyframes.front().t_ns;
+  for (const std::int64_t start_ns : {first_ns, first_ns - 3600'000'000'000}) {
+    segment.session_start_ns = start_ns;
+    EXPECT_THAT(Validate(segment, theta), IsEmpty()) << start_ns;
+  }
+  theta.cameras[0].time_drift.reset();
+  segment.session_start_ns = first_ns + 1;
+  expect("is later than the first keyframe");
+  segment.session_start_ns = first_ns - 31 * 86400'000'000'000;
+  expect("before the first keyframe");
+  segment.session_start_ns = std::numeric_limits<std::int64_t>::min();
+  expect("out of range");
+}
+
 TEST(ValidateSegment, GapsAreLimited) {
   MotionSegment segment = ValidSegment();
   SegmentLimits limits;

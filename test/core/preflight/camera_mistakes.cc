@@ -90,7 +90,7 @@ void ExposeRowsOneAfterTheOther(FedData* data) {
                     theta,
                     std::vector<char>(theta.cameras.size(), 1),
                     segment.keyframes,
-                    [&](std::size_t) { return std::span(segment.imu); });
+                    [&](std::size_t k) { return ContextOf(segment, k); });
     std::erase_if(segment.observations, [&](Observation& o) {
       const KeyframeState& x = segment.keyframes[o.keyframe];
       const CameraCalibration& camera = theta.cameras[o.camera];

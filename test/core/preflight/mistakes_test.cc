@@ -126,6 +126,39 @@ TEST(Mistakes, ARollingShutterIsFoundWhereTheSlamSystemIgnoresIt) {
   }
 }
 
+// A SLAM system with a constant offset: its states are later and later. Clean
+// data over the same time has no finding, nor one whose drift is stated.
+TEST(Mistakes, ClocksThatDriftAreFoundWhereTheSlamSystemIgnoresIt) {
+  const Rig rig = HandheldRig("rig");
+  for (const double drift : {-1e-4, 3e-5, 0.0}) {
+    Calibration truth = rig.factory;
+    truth.cameras[0].time_drift = drift;
+    const std::vector<MotionSegment> segments =
+        SimulateApart(rig, truth, 6, 60, {.seed = 7});
+    const Diagnosis diagnosis = Diagnose(rig, rig.factory, segments);
+    const auto found =
+        std::find_if(diagnosis.findings.begin(),
+                     diagnosis.findings.end(),
+                     [](const Finding& one) {
+                       return one.kind == FindingKind::kClockDrift;
+                     });
+    if (drift == 0) {
+      EXPECT_TRUE(diagnosis.findings.empty()) << Text(diagnosis);
+      continue;
+    }
+    ASSERT_NE(found, diagnosis.findings.end()) << Text(diagnosis);
+    std::cout << "drift " << 1e6 * drift << " us/s, found "
+              << 1e6 * found->value << " us/s\n";
+    EXPECT_NEAR(found->value, drift, 0.1 * std::abs(drift));
+    Rig stated = rig;
+    stated.factory = truth;
+    EXPECT_TRUE(Diagnose(stated,
+                         truth,
+                         SimulateApart(stated, truth, 6, 60, {.seed = 7}))
+                    .findings.empty());
+  }
+}
+
 // Rates cannot be checked at rest, and the diagnosis reports that.
 TEST(Mistakes, OfTheGyroscopeAreNotCheckedAtRest) {
   FedData data = Simulated(HandheldRig("rig"), *MakeRest(40), 4);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
@@ -120,6 +121,31 @@ inline SimulationOptions PerfectSlam() {
   options.slam_gyro_bias_radps = 0;
   options.slam_landmark_relative = 0;
   return options;
+}
+
+// Single segments, each of its own motion, with this much time from one to the
+// next since their sessions began.
+inline std::vector<MotionSegment> SimulateApart(const Rig& rig,
+                                                const Calibration& truth,
+                                                int count,
+                                                double apart_s,
+                                                SimulationOptions options) {
+  const std::uint64_t seed = options.seed;
+  const double segment_s =
+      options.keyframes_per_segment / options.keyframe_rate_hz;
+  std::vector<MotionSegment> segments;
+  for (int i = 0; i < count; ++i) {
+    options.seed = 100 * seed + static_cast<std::uint64_t>(i);
+    options.session_age_s = i * apart_s;
+    segments.push_back(Simulate(rig,
+                                truth,
+                                rig.factory,
+                                *MakeHandheld(segment_s + 0.5, 1, options.seed),
+                                "apart-" + std::to_string(i),
+                                options)
+                           .segments.front());
+  }
+  return segments;
 }
 
 // A device moved vigorously, whose SLAM system believes a perturbed

@@ -76,12 +76,14 @@ TEST(Scorers, AgreeOnEveryLensWithTimesAndHeldComponents) {
   rig.factory.cameras[1].time_offset_s = -0.013;
   rig.blocks = {{"*.time_offset", true}};
   rig.factory.cameras[1].line_delay_s = 6e-5;
+  rig.factory.cameras[1].time_drift = 3e-5;
   rig.groups = DefaultGroups(rig.blocks, rig.factory);
   rig.fixed = {"cam0.distortion.*", "imu.q_AI.y"};
   const Calibration theta0 = PerturbCalibration(rig.factory, {}, 3);
   SimulationOptions options;
   options.seed = 3;
   options.keyframes_per_segment = 20;
+  options.session_age_s = 50;
   const MotionSegment segment =
       OneSegment(rig, theta0, *MakeHandheld(2.2, 1, 3), options).slam;
   ScoreOptions gauge;

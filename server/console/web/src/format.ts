@@ -56,6 +56,7 @@ const kParts: Record<string, string> = {
   principal: 'principal point',
   time_offset: 'time offset',
   line_delay: 'line delay',
+  time_drift: 'drift of the clock',
   q_CI: 'rotation to the IMU',
   p_CI: 'position to the IMU',
 };
