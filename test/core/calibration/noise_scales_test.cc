@@ -98,7 +98,7 @@ TEST(NoiseScales, OfTheImuAreNotTooSmallWithTheErrorsOfATracker) {
   Rig rig = HandheldRig("r");
   rig.pixel_sigma_px = kTrackerSigma_px;
   SimulationOptions options;
-  options.seed = 2;
+  options.seed = 3;
   options.mean_track_length = 20;
   options.revisit_fraction = 0;
   UseTrackerErrors(&options);
@@ -106,7 +106,7 @@ TEST(NoiseScales, OfTheImuAreNotTooSmallWithTheErrorsOfATracker) {
       Simulate(rig,
                rig.factory,
                rig.factory,
-               *MakeHandheld(16.5, 1, options.seed),
+               *MakeHandheld(20.5, 1, options.seed),
                "session",
                options)
           .segments;
