@@ -41,6 +41,9 @@ constexpr double kMayBeDetermined = 0.5 / Square(kDeterminedLogSigma);
 // redundancy at the stated value, and much at the actual one.
 constexpr double kMaxDistance = 0.3;
 constexpr double kRelevantRedundancy = 0.5;
+// Errors of tracks have much in common if the track noise exceeds the noise
+// scale of pixels by this factor.
+constexpr double kMuchInCommon = 1.2;
 
 // Prior information about the logarithms of the noise scales relative to the
 // stated noise.
@@ -255,24 +258,11 @@ double GuessPixelFactor(const SolverRound& round,
          std::sqrt(left);
 }
 
-}  // namespace
-
-std::vector<NoiseScale> EstimateNoiseScales(
-    const Rig& stated,
-    const SolverRound& round,
-    const CalibrationEstimate& estimate,
-    const std::vector<ScreenedLandmark>& landmarks,
-    double track_noise) {
-  NoiseProblem problem(round, estimate, landmarks, track_noise);
-  NoiseVector taken;
-  for (int i = 0; i < kNoiseKinds; ++i) {
-    const auto kind = static_cast<NoiseKind>(i);
-    taken[i] = std::log(NoiseOf(kind, round.rig) / NoiseOf(kind, stated));
-  }
-  Likelihood likelihood(&problem, taken);
-  NoiseVector start = NoiseVector::Zero();
-  start[IndexOf(NoiseKind::kPixel)] =
-      std::log(GuessPixelFactor(round, estimate, landmarks));
+// The maximum from this start.
+std::vector<NoiseScale> ScalesFrom(const NoiseVector& start,
+                                   const NoiseVector& taken,
+                                   NoiseProblem* problem) {
+  Likelihood likelihood(problem, taken);
   if (!likelihood.MoveTo(start)) return {};
   const std::optional<Maximum> maximum = Maximise(&likelihood);
   if (!maximum) return {};
@@ -288,6 +278,40 @@ std::vector<NoiseScale> EstimateNoiseScales(
                       redundancy,
                       1,
                       maximum->converged});
+  }
+  return scales;
+}
+
+}  // namespace
+
+std::vector<NoiseScale> EstimateNoiseScales(
+    const Rig& stated,
+    const SolverRound& round,
+    const CalibrationEstimate& estimate,
+    const std::vector<ScreenedLandmark>& landmarks,
+    double track_noise) {
+  NoiseProblem problem(round, estimate, landmarks, track_noise);
+  NoiseVector taken;
+  for (int i = 0; i < kNoiseKinds; ++i) {
+    const auto kind = static_cast<NoiseKind>(i);
+    taken[i] = std::log(NoiseOf(kind, round.rig) / NoiseOf(kind, stated));
+  }
+  NoiseVector start = NoiseVector::Zero();
+  start[IndexOf(NoiseKind::kPixel)] =
+      std::log(GuessPixelFactor(round, estimate, landmarks));
+  std::vector<NoiseScale> scales = ScalesFrom(start, taken, &problem);
+  if (scales.empty() ||
+      track_noise < kMuchInCommon * scales[IndexOf(NoiseKind::kPixel)].factor) {
+    return scales;
+  }
+  NoiseProblem apart(round, estimate, landmarks, 0);
+  for (int i = 0; i < kNoiseKinds; ++i) start[i] = std::log(scales[i].factor);
+  const std::vector<NoiseScale> others = ScalesFrom(start, taken, &apart);
+  if (others.empty()) return {};
+  for (const NoiseKind kind : {NoiseKind::kGyro, NoiseKind::kAccel}) {
+    const NoiseScale& other = others[IndexOf(kind)];
+    NoiseScale& scale = scales[IndexOf(kind)];
+    if (other.factor > scale.factor) scale = other;
   }
   return scales;
 }

@@ -36,8 +36,11 @@ namespace selfcal {
 // `landmarks` are without the track noise. `track_noise` is the result of
 // TrackNoiseFactor (track_noise.h): if it exceeds the noise scale of pixels,
 // errors are correlated along tracks, and the reprojections are weighted by it
-// relative to all other factors. Returns an empty vector if the linear system
-// fails.
+// relative to all other factors. What is common to a track does not move one
+// keyframe against the next, though, and independent errors of that size would
+// explain motion that is the noise of the IMU: if the excess is much, the white
+// noise of each sensor is the larger one of two estimates, with and without it.
+// Returns an empty vector if the linear system fails.
 std::vector<NoiseScale> EstimateNoiseScales(
     const Rig& stated,
     const SolverRound& round,

@@ -21,6 +21,9 @@ constexpr double kDepthSlack = 2;
 // it is not observed.
 constexpr int kMaxRowIterations = 50;
 constexpr double kRowConverged_px = 1e-9;
+// Largest scale of the errors of a track, in sigmas: the checks of a tracker
+// end patches that are worse.
+constexpr double kLargestScale = 50;
 
 bool InsideImage(const CameraCalibration& camera, const Eigen::Vector2d& z_px) {
   return z_px.x() >= 0 && z_px.y() >= 0 && z_px.x() <= camera.width_px - 1 &&
@@ -32,6 +35,20 @@ Eigen::Vector2d RandomPixel(const CameraCalibration& camera, Random* random) {
   const double y = random->Uniform(0, camera.height_px - 1);
   return {x, y};
 }
+
+// Errors of a track in one camera, in sigmas.
+struct TrackError {
+  int keyframe = -2;  // of the last observation
+  Eigen::Vector2d drift = Eigen::Vector2d::Zero();
+  Eigen::Vector2d common = Eigen::Vector2d::Zero();
+  double scale = 1;
+};
+
+// The first observation of a landmark.
+struct Birth {
+  int keyframe = 0;
+  int camera = 0;
+};
 
 class Tracker {
  public:
@@ -50,6 +67,7 @@ class Tracker {
         outliers_(options.seed, kOutlierStream),
         moving_(options.seed, kMovingLandmarkStream),
         blur_(options.seed, kBlurStream),
+        patches_(options.seed, kPatchStream),
         tracked_(theta.cameras.size()),
         errors_(theta.cameras.size()) {}
 
@@ -129,7 +147,7 @@ class Tracker {
     trackers_.push_back(0);
     last_seen_.push_back(-1);
     begun_.push_back(keyframe_);
-    made_.push_back(keyframe_);
+    made_.push_back({keyframe_, camera});
     velocities_mps_.push_back(DrawVelocity());
     return static_cast<int>(tracks_.landmarks_G.size()) - 1;
   }
@@ -193,20 +211,41 @@ class Tracker {
   }
 
   // Error of the next pixel of a track, in sigmas: a first-order autoregressive
-  // process.
+  // process, and what is common to the track.
   Eigen::Vector2d NextError(int camera, int landmark) {
     std::vector<TrackError>& errors = errors_[camera];
     if (errors.size() < begun_.size()) errors.resize(begun_.size());
-    TrackError& last = errors[landmark];
+    TrackError& track = errors[landmark];
     const double dx = noise_.Normal();
     const double dy = noise_.Normal();
-    Eigen::Vector2d error(dx, dy);
-    if (last.keyframe == keyframe_ - 1) {
+    const Eigen::Vector2d drawn(dx, dy);
+    if (track.keyframe == keyframe_ - 1) {
       const double rho = options_.pixel_correlation;
-      error = rho * last.error + std::sqrt(1 - rho * rho) * error;
+      track.drift = rho * track.drift + std::sqrt(1 - rho * rho) * drawn;
+    } else {
+      track.drift = drawn;
+      DrawPatch(&track);
     }
-    last = {keyframe_, error};
-    return error;
+    track.keyframe = keyframe_;
+    if (options_.pixel_shared == 0) return track.scale * track.drift;
+    const Birth& made = made_[landmark];
+    if (made.keyframe == keyframe_ && made.camera == camera) {
+      return Eigen::Vector2d::Zero();
+    }
+    return track.scale * (std::sqrt(options_.pixel_shared) * track.common +
+                          std::sqrt(1 - options_.pixel_shared) * track.drift);
+  }
+
+  // What the errors of a new track have in common.
+  void DrawPatch(TrackError* track) {
+    const double dx = patches_.Normal();
+    const double dy = patches_.Normal();
+    track->common = {dx, dy};
+    const double freedom = options_.pixel_freedom;
+    if (freedom == 0) return;
+    do {
+      track->scale = std::sqrt(0.5 * freedom / patches_.Gamma(0.5 * freedom));
+    } while (!(track->scale <= kLargestScale));
   }
 
   // Error of the pixel of a point that moves in the image during the exposure,
@@ -231,7 +270,7 @@ class Tracker {
     observation.landmark = landmark;
     if (!Sees(camera, landmark, &observation.true_px)) return false;
     const double moved_s =
-        (keyframe_ - made_[landmark]) / options_.keyframe_rate_hz;
+        (keyframe_ - made_[landmark].keyframe) / options_.keyframe_rate_hz;
     const Eigen::Vector3d p_G =
         tracks_.landmarks_G[landmark] + moved_s * velocities_mps_[landmark];
     if (!SeesPoint(exposures_, camera, p_G, &observation.measured_px)) {
@@ -259,23 +298,26 @@ class Tracker {
   Random outliers_;
   Random moving_;
   Random blur_;
+  Random patches_;
   int keyframe_ = 0;
   FeatureTracks tracks_;
-  struct TrackError {
-    int keyframe = -2;  // of the last observation
-    Eigen::Vector2d error = Eigen::Vector2d::Zero();
-  };
   std::vector<std::vector<int>> tracked_;        // landmarks in each camera
   std::vector<std::vector<TrackError>> errors_;  // of these landmarks
   std::vector<int> trackers_;   // for each landmark: cameras that track it
   std::vector<int> last_seen_;  // for each landmark: keyframe, or -1
   std::vector<int> begun_;      // for each landmark: keyframe
-  std::vector<int>
-      made_;  // for each landmark: keyframe of its first observation
+  std::vector<Birth> made_;     // for each landmark
   std::vector<Eigen::Vector3d> velocities_mps_;  // for each landmark
 };
 
 }  // namespace
+
+void UseTrackerErrors(SimulationOptions* options) {
+  options->pixel_correlation = 0.75;
+  options->pixel_shared = 0.62;
+  options->pixel_freedom = 1.5;
+  options->outlier_fraction = 0.003;
+}
 
 FeatureTracks SimulateTracks(const Calibration& theta,
                              double pixel_sigma_px,

@@ -55,6 +55,21 @@ Eigen::Vector3d Random::Normal3() {
   return {x, y, z};
 }
 
+double Random::Gamma(double shape) {
+  if (shape < 1) {
+    // 1 - u lies in (0, 1].
+    return Gamma(shape + 1) * std::pow(1 - Uniform(), 1 / shape);
+  }
+  const double d = shape - 1.0 / 3;
+  const double c = 1 / std::sqrt(9 * d);
+  for (;;) {
+    const double x = Normal();
+    const double v = std::pow(1 + c * x, 3);
+    const double log_u = std::log(1 - Uniform());
+    if (v > 0 && log_u < 0.5 * x * x + d * (1 - v + std::log(v))) return d * v;
+  }
+}
+
 Eigen::Vector3d Random::Direction() {
   const double z = Uniform(-1, 1);
   const double angle = Uniform(0, 2 * std::numbers::pi);

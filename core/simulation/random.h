@@ -29,6 +29,8 @@ class Random {
   // Standard normal (Box and Muller 1958).
   double Normal();
   Eigen::Vector3d Normal3();
+  // Gamma distribution of unit scale, shape > 0 (Marsaglia and Tsang 2000).
+  double Gamma(double shape);
   // Uniform on the unit sphere.
   Eigen::Vector3d Direction();
 

@@ -44,6 +44,13 @@ struct SimulationOptions {
   // keyframe, in [0, 1): real trackers drift, so that errors are correlated
   // along a track.
   double pixel_correlation = 0;
+  // Part of the variance of the pixel error that the observations of a track
+  // have in common, all but the first of its landmark, which has no error: that
+  // of the patch with which it began.
+  double pixel_shared = 0;
+  // Degrees of freedom of Student's distribution of pixel errors, of which a
+  // track has one scale: most patches are good ones. 0: normal errors.
+  double pixel_freedom = 0;
   // Exposure time. Points that move in the image during it are blurred, and
   // detected with an additional error along the blur of blur_error times its
   // length, one standard deviation.
@@ -72,6 +79,12 @@ struct SimulationOptions {
   Eigen::Vector3d b_a0 = {0.05, -0.08, 0.1};
   Eigen::Vector3d b_g0 = {0.004, -0.003, 0.002};
 };
+
+// Sets what docs/recordings.md measures of the errors of tracks in images:
+// correlation, common part, tails and outliers. A rig whose pixels err by
+// kTrackerSigma_px then has the errors of a real tracker.
+inline constexpr double kTrackerSigma_px = 0.026;
+void UseTrackerErrors(SimulationOptions* options);
 
 // A landmark with fewer observations in a segment is excluded from it.
 inline constexpr int kMinSegmentObservations = 3;

@@ -16,6 +16,7 @@ inline constexpr std::uint64_t kSlamLandmarkStream = 108;
 inline constexpr std::uint64_t kPerturbStream = 109;
 inline constexpr std::uint64_t kMovingLandmarkStream = 111;
 inline constexpr std::uint64_t kBlurStream = 112;
+inline constexpr std::uint64_t kPatchStream = 113;
 inline constexpr std::uint64_t kLostSampleStream = 121;
 
 }  // namespace selfcal

@@ -47,6 +47,17 @@ TrustDevice WithOptions(std::uint64_t seed,
   return device;
 }
 
+// Pixels err as those of the tracker do on images, and the rig states 0.8 px.
+TrustDevice WithTrackerErrors(std::uint64_t seed) {
+  TrustDevice device = MakeTrustDevice(seed);
+  device.sensors.pixel_sigma_px = kTrackerSigma_px;
+  SimulationOptions options = TrustOptions(seed);
+  UseTrackerErrors(&options);
+  AddSession(
+      MakeHandheld(kTrustSession_s, 1, seed), "handheld", options, &device);
+  return device;
+}
+
 // The SLAM system's states are fitted to the data with its own calibration.
 TrustDevice WithEstimatedStates(std::uint64_t seed) {
   TrustDevice device = MakeTrustDevice(seed);
@@ -99,6 +110,12 @@ std::vector<TrustKind> NoiseKinds() {
                        options->pixel_correlation = 0.8;
                      });
                    }});
+  kinds.push_back({"tracker_errors",
+                   "pixel errors as those of the tracker on images",
+                   48'000,
+                   10,
+                   0,
+                   WithTrackerErrors});
   kinds.push_back({"reused_map",
                    "half of the new tracks are of landmarks seen before",
                    36'000,

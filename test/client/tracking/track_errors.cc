@@ -5,6 +5,7 @@
 #include <ctime>
 #include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 namespace selfcal {
@@ -132,8 +133,14 @@ ErrorStatistics Summarise(const TrackedRecording& tracked) {
   }
   statistics.mean_length = total / static_cast<double>(lengths.size());
   std::sort(distances.begin(), distances.end());
-  statistics.median_px = distances[distances.size() / 2];
-  statistics.p95_px = distances[distances.size() * 95 / 100];
+  const auto below = [&](std::size_t percent) {
+    return distances[distances.size() * percent / 100];
+  };
+  statistics.median_px = below(50);
+  statistics.p75_px = below(75);
+  statistics.p90_px = below(90);
+  statistics.p95_px = below(95);
+  statistics.p99_px = below(99);
   double squares = 0;
   for (const double distance : distances) squares += distance * distance;
   statistics.sigma_px =
@@ -141,6 +148,28 @@ ErrorStatistics Summarise(const TrackedRecording& tracked) {
   statistics.correlation =
       squares_a > 0 ? products / std::sqrt(squares_a * squares_b) : 0;
   return statistics;
+}
+
+double CorrelationAfter(const TrackedRecording& tracked, int images) {
+  std::map<std::tuple<int, std::uint64_t, int>, Eigen::Vector2d> good;
+  for (const TrackError& error : tracked.errors) {
+    if (error.first || !error.in_view ||
+        error.error_px.norm() > kGoodPoint_px) {
+      continue;
+    }
+    const client::TrackPoint& point = error.point;
+    good[{point.camera, point.landmark, point.image}] = error.error_px;
+  }
+  double products = 0, squares_a = 0, squares_b = 0;
+  for (const auto& [key, a] : good) {
+    const auto& [camera, landmark, image] = key;
+    const auto b = good.find({camera, landmark, image + images});
+    if (b == good.end()) continue;
+    products += a.dot(b->second);
+    squares_a += a.squaredNorm();
+    squares_b += b->second.squaredNorm();
+  }
+  return squares_a > 0 ? products / std::sqrt(squares_a * squares_b) : 0;
 }
 
 double SigmaAtAge(const TrackedRecording& tracked, int age) {

@@ -44,10 +44,19 @@ struct ErrorStatistics {
   double mean_length = 0;   // of tracks that have ended or not [images]
   double median_px = 0;     // of the distance
   double sigma_px = 0;      // of an axis, from the squares
-  double p95_px = 0;        // of the distance
-  double correlation = 0;   // with the error in the image before
+  double p75_px = 0;        // of the distance
+  double p90_px = 0;
+  double p95_px = 0;
+  double p99_px = 0;
+  double correlation = 0;  // with the error in the image before
 };
 ErrorStatistics Summarise(const TrackedRecording& tracked);
+
+// Correlation of the errors of a track that are this many images apart, of
+// points that are neither first nor farther than kGoodPoint_px from the truth:
+// a few bad tracks do not decide it. 0 without any.
+inline constexpr double kGoodPoint_px = 0.3;
+double CorrelationAfter(const TrackedRecording& tracked, int images);
 
 // Standard deviation of an axis over points of this age, without outliers; 0
 // for fewer than 20.

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
+#include <vector>
 
 #include "core/simulation/imu_readings.h"
 #include "test/core/simulation/rigs.h"
@@ -242,6 +244,72 @@ TEST(FeatureTracksTest, TheWantedFractionOfLandmarksMoves) {
   }
   ASSERT_GT(n, 1000);
   EXPECT_NEAR(moved / n, 0.2, 5 * std::sqrt(0.2 * 0.8 / n));
+}
+
+// Tracks of a device at rest end at random only: what is measured of errors is
+// that of all tracks.
+TEST(FeatureTracksTest, ErrorsOfATrackerHaveTheStatedTailsAndCorrelation) {
+  const Rig rig = HandheldRig("a");
+  SimulationOptions options;
+  options.revisit_fraction = 0;
+  options.mean_track_length = 20;
+  UseTrackerErrors(&options);
+  options.outlier_fraction = 0;
+  const FeatureTracks tracks = Tracks(
+      rig, kTrackerSigma_px, Keyframes(*MakeHandheld(120, 0.3, 6)), options);
+  // Distances of the second observation of each landmark, and the cosine
+  // between the errors of observations that are this many keyframes apart.
+  std::map<int, std::vector<Eigen::Vector2d>> errors;
+  for (const FeatureObservation& z : tracks.observations) {
+    errors[z.landmark].push_back(z.measured_px - z.true_px);
+  }
+  std::vector<double> distances;
+  std::map<std::size_t, std::pair<double, double>> cosines;  // sum, number
+  for (const auto& [landmark, of_track] : errors) {
+    EXPECT_EQ(of_track[0].norm(), 0);
+    if (of_track.size() > 1) distances.push_back(of_track[1].norm());
+    for (const std::size_t apart : {1, 15}) {
+      if (of_track.size() < apart + 2) continue;
+      const Eigen::Vector2d a = of_track[1].normalized();
+      cosines[apart].first += a.dot(of_track[1 + apart].normalized());
+      ++cosines[apart].second;
+    }
+  }
+  std::sort(distances.begin(), distances.end());
+  const auto n = static_cast<double>(distances.size());
+  ASSERT_GT(n, 5'000);
+  // Student's distribution in two dimensions: P(d > x) = (1 + (x / s)^2 / nu)^
+  // (-nu / 2).
+  for (const double part : {0.1, 0.5, 0.9, 0.95}) {
+    const double x_px =
+        kTrackerSigma_px * std::sqrt(1.5 * (std::pow(1 - part, -2 / 1.5) - 1));
+    const auto below =
+        std::lower_bound(distances.begin(), distances.end(), x_px) -
+        distances.begin();
+    // A thousandth of the tail is cut off.
+    EXPECT_NEAR(static_cast<double>(below) / n,
+                part,
+                0.003 + 4 * std::sqrt(part * (1 - part) / n));
+  }
+  // The mean cosine of two directions of normal vectors with a correlation c
+  // is pi / 4 c (1 + c^2 / 8 + 3 c^4 / 64 + ...).
+  const auto cosine = [](double c) {
+    double sum = 0, term = std::numbers::pi / 4 * c;
+    for (int k = 0; k < 200; ++k) {
+      sum += term;
+      term *= c * c * (k + 0.5) * (k + 0.5) / ((k + 1.0) * (k + 2.0));
+    }
+    return sum;
+  };
+  for (const auto& [apart, sum] : cosines) {
+    const double drift =
+        std::pow(options.pixel_correlation, static_cast<double>(apart));
+    EXPECT_NEAR(
+        sum.first / sum.second,
+        cosine(options.pixel_shared + (1 - options.pixel_shared) * drift),
+        4 / std::sqrt(2 * sum.second))
+        << apart;
+  }
 }
 
 // Each point is where it projects when the row of its image is exposed: the

@@ -64,6 +64,32 @@ TEST(RandomTest, UniformNumbersFillTheirInterval) {
   EXPECT_NEAR(sum, 2, 5 * 8 / std::sqrt(12.0 * kDraws));
 }
 
+TEST(RandomTest, GammaNumbersHaveTheMomentsOfTheGammaDistribution) {
+  for (const double shape : {0.4, 0.75, 1.0, 6.0}) {
+    Random random(9, 0);
+    double sum = 0, squares = 0, logs = 0;
+    for (int i = 0; i < kDraws; ++i) {
+      const double x = random.Gamma(shape);
+      ASSERT_GT(x, 0);
+      sum += x / kDraws;
+      squares += (x - shape) * (x - shape) / kDraws;
+      logs += std::log(x) / kDraws;
+    }
+    // The mean of the logarithm is the digamma function: the derivative of
+    // lgamma.
+    const double digamma =
+        (std::lgamma(shape + 1e-4) - std::lgamma(shape - 1e-4)) / 2e-4;
+    EXPECT_NEAR(sum, shape, 5 * std::sqrt(shape / kDraws));
+    EXPECT_NEAR(squares,
+                shape,
+                5 * std::sqrt((2 * shape * shape + 6 * shape) / kDraws));
+    // The variance of the logarithm is below 1 / shape + 1 / shape^2.
+    EXPECT_NEAR(logs,
+                digamma,
+                5 * std::sqrt((1 / shape + 1 / (shape * shape)) / kDraws));
+  }
+}
+
 TEST(RandomTest, ChancesHaveTheStatedProbability) {
   Random random(7, 0);
   double sum = 0;
