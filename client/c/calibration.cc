@@ -377,6 +377,27 @@ int32_t selfcal_calibration_correct_imu(const selfcal_calibration* calibration,
   });
 }
 
+int32_t selfcal_calibration_carry_biases(const selfcal_calibration* from,
+                                         const selfcal_calibration* to,
+                                         const double f_I[3],
+                                         double b_g[3],
+                                         double b_a[3],
+                                         selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = selfcal::c::CheckAllNotNull(
+        {{from, "from"}, {to, "to"}, {f_I, "f_I"}, {b_g, "b_g"}, {b_a, "b_a"}});
+    if (!status.ok()) return status;
+    const selfcal::ImuBiases carried =
+        selfcal::CarryBiases(selfcal::c::ThetaOf(from).imu,
+                             selfcal::c::ThetaOf(to).imu,
+                             Eigen::Vector3d(f_I),
+                             {Eigen::Vector3d(b_g), Eigen::Vector3d(b_a)});
+    selfcal::c::Copy(carried.b_g, b_g);
+    selfcal::c::Copy(carried.b_a, b_a);
+    return absl::OkStatus();
+  });
+}
+
 int32_t selfcal_calibration_project(const selfcal_calibration* calibration,
                                     int32_t camera,
                                     const double p_C[3],

@@ -553,6 +553,17 @@ int32_t selfcal_calibration_correct_imu(const selfcal_calibration* calibration,
                                         double w_I[3],
                                         double f_I[3],
                                         selfcal_error* error);
+// For a filter that exchanges its calibration while it runs: changes its biases
+// b_g [rad/s, in I] and b_a [m/s^2, in A] so that readings at rest mean under
+// `to` what they have meant under `from`, where f_I is the specific force at
+// rest: (0, 0, g), rotated from G to I. Biases take up what a calibration gets
+// wrong; a filter would have to learn them again.
+int32_t selfcal_calibration_carry_biases(const selfcal_calibration* from,
+                                         const selfcal_calibration* to,
+                                         const double f_I[3],
+                                         double b_g[3],
+                                         double b_a[3],
+                                         selfcal_error* error);
 // Projects a point in the camera frame (any positive scale) to its pixel,
 // whether or not that is inside the image. SELFCAL_OUT_OF_RANGE: there is no
 // such camera, or the model has no answer: it is not one-to-one at the point (a

@@ -25,6 +25,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -68,6 +69,15 @@ using Quaternion = selfcal_quaternion;
 using ImuSample = selfcal_imu_sample;
 using KeyframeState = selfcal_keyframe_state;
 using Observation = selfcal_observation;
+
+// An observation of a track that has no position: it is triangulated.
+inline Observation ObservationOfTrack(std::uint64_t track,
+                                      std::int32_t camera,
+                                      double u_px,
+                                      double v_px) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  return {track, camera, 0, {u_px, v_px}, {none, none, none}};
+}
 
 namespace internal {
 
@@ -202,6 +212,18 @@ class Calibration {
     selfcal_error error;
     internal::Check(selfcal_calibration_correct_imu(
                         handle_.get(), gyro, accel, b_g, b_a, w_I, f_I, &error),
+                    error);
+  }
+
+  // Changes the biases of a filter that takes this calibration instead of
+  // `from` (selfcal_calibration_carry_biases).
+  void CarryBiases(const Calibration& from,
+                   const double (&f_I)[3],
+                   double (&b_g)[3],
+                   double (&b_a)[3]) const {
+    selfcal_error error;
+    internal::Check(selfcal_calibration_carry_biases(
+                        from.get(), handle_.get(), f_I, b_g, b_a, &error),
                     error);
   }
 

@@ -18,6 +18,7 @@
 #include "client/cli/device_data.h"
 #include "client/cli/diagnosis_text.h"
 #include "client/cli/foreign_files.h"
+#include "client/cli/motion_advice.h"
 #include "client/cli/positive_number.h"
 #include "client/cli/preflight_subject.h"
 #include "client/cli/progress.h"
@@ -182,6 +183,24 @@ void WarnOfMistakes(Context* context, const std::string& rig) {
   }
 }
 
+// Says what is still to be recorded, as `rig coach` does, and leaves it beside
+// the report. Predictions are for the active version.
+int WriteWhatToRecord(Context* context,
+                      const std::string& rig,
+                      const fs::path& folder) {
+  v1::AdviseMotionResponse response;
+  const grpc::Status status = AskForAdvice(context, rig, 1, &response);
+  if (!status.ok()) return Fail(*context, status);
+  std::string text = MissingText(response);
+  const absl::Status written =
+      WriteTextFiles({{"what_to_record.txt", text}},
+                     {(folder / "what_to_record.txt").string()},
+                     true);
+  text.pop_back();
+  PrintError(text);
+  return written.ok() ? kDone : FailInput(written);
+}
+
 int FeedAndCalibrate(Context* context,
                      const CalibrateInput& input,
                      std::vector<RecordedSession>* sessions) {
@@ -212,7 +231,9 @@ int FeedAndCalibrate(Context* context,
   const int code = Recalibrate(context, *input.rig.id);
   const int written =
       WriteResults(context, *input.rig.id, input.output, input.rig.imu_rate_hz);
-  return code != kDone ? code : written;
+  const int advised = WriteWhatToRecord(context, *input.rig.id, input.output);
+  if (code != kDone) return code;
+  return written != kDone ? written : advised;
 }
 
 int Calibrate(Context* context, CalibrateInput input) {

@@ -10,23 +10,18 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/motion_advice.h"
 #include "client/cli/positive_number.h"
 #include "client/text/text.h"
-#include "proto/resource_names.h"
-#include "selfcal/v1/calibration_service.grpc.pb.h"
+#include "selfcal/v1/calibration_service.pb.h"
 
 namespace selfcal::client {
 namespace {
 
-using CalibrationService = v1::CalibrationService::StubInterface;
 using AdviceResponse = v1::AdviseMotionResponse;
 
 // A segment is scored every few seconds.
 constexpr std::chrono::milliseconds kPoll(1000);
-
-std::string GainText(double gain_nats) {
-  return fmt::format("{:.2f}", gain_nats);
-}
 
 // Returns e.g. "imu 3.10, camera 0.42".
 std::string GroupsText(const AdviceResponse::Advice& advice) {
@@ -94,6 +89,7 @@ void PrintAdvice(const Context& context, const AdviceResponse& response) {
       PrintText(fmt::format(
           "  {:8.3g}  {}\n", weak.sigma_by_reference(), weak.words()));
     }
+    PrintText(MissingText(response));
     PrintText(fmt::format("predicted for a segment of {:g} s:\n",
                           response.segment_seconds()));
   }
@@ -113,18 +109,6 @@ void PrintLine(const Context& context, const AdviceResponse& response) {
                         best.instruction(),
                         GainText(best.gain_nats()),
                         KnownText(response)));
-}
-
-grpc::Status AskForAdvice(Context* context,
-                          const std::string& rig,
-                          int top,
-                          AdviceResponse* response) {
-  const auto stub = v1::CalibrationService::NewStub(context->Channel());
-  v1::AdviseMotionRequest request;
-  request.set_parent(RigName(rig));
-  request.set_max_advice(top);
-  return Call<CalibrationService>(
-      stub.get(), &CalibrationService::AdviseMotion, request, response);
 }
 
 int Coach(Context* context, const std::string& rig, int top) {

@@ -3,7 +3,7 @@
 //
 //   stream_recording_c TARGET RIG DIR [SPOOL_DIR]
 //
-// stream_recording.cc describes the files in DIR, and the exit code.
+// recording.h describes the files in DIR, stream_recording.cc the exit code.
 #include <inttypes.h>
 #include <selfcal/selfcal.h>
 #include <stdio.h>

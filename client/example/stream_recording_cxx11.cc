@@ -3,7 +3,7 @@
 //
 //   stream_recording_cxx11 TARGET RIG DIR [SPOOL_DIR]
 //
-// stream_recording.cc describes the files in DIR, and the exit code.
+// recording.h describes the files in DIR, stream_recording.cc the exit code.
 #include <algorithm>
 #include <cstdio>
 #include <fstream>

@@ -13,8 +13,6 @@
 namespace selfcal {
 namespace {
 
-// Fewer segments have no majority.
-constexpr int kLeastSegments = 4;
 // False-alarm probability, over all segments of a calibration.
 constexpr double kChance = 1e-5;
 // Residuals larger than those of the other segments by this factor are not
@@ -158,7 +156,7 @@ double TestEach(std::vector<SegmentEvidence>* evidence) {
 
 AgreementTest TestHalves(const std::vector<SegmentEvidence>& evidence,
                          double excess) {
-  if (evidence.size() < kLeastSegments) return {};
+  if (evidence.size() < kLeastToAgree) return {};
   Sum first, second;
   for (std::size_t i = 0; i < evidence.size(); ++i) {
     (i < evidence.size() / 2 ? first : second).Add(evidence[i]);
@@ -171,7 +169,7 @@ std::vector<Contradiction> FindContradictions(
     const std::vector<SegmentEvidence>& evidence, bool converged) {
   std::vector<Contradiction> found;
   const auto size = static_cast<int>(evidence.size());
-  if (size < kLeastSegments) return found;
+  if (size < kLeastToAgree) return found;
   std::vector<int> left(evidence.size());
   for (int i = 0; i < size; ++i) left[i] = i;
   const auto usual = [&](double SegmentFit::*ratio) {
@@ -193,7 +191,7 @@ std::vector<Contradiction> FindContradictions(
       leave_out(at, Percent("reprojection", fit.pixel_ratio, pixels));
     }
   }
-  while (static_cast<int>(left.size()) >= kLeastSegments &&
+  while (static_cast<int>(left.size()) >= kLeastToAgree &&
          2 * static_cast<int>(left.size() - 1) > size) {
     Sum all;
     for (const int i : left) all.Add(evidence[i]);
@@ -232,7 +230,7 @@ std::vector<Contradiction> FindMisfits(const std::vector<double>& fits) {
       fits.begin(), fits.end(), std::back_inserter(measured), [](double fit) {
         return fit > 0;
       });
-  if (measured.size() < kLeastSegments) return found;
+  if (measured.size() < kLeastToAgree) return found;
   const double usual = std::max(1.0, UpperMedian(measured));
   for (std::size_t i = 0; i < fits.size(); ++i) {
     if (fits[i] > kMaxRatio * usual) {

@@ -20,6 +20,10 @@
 
 namespace selfcal {
 
+// Fewer segments have no majority: halves are not tested, and no contradictions
+// found.
+inline constexpr int kLeastToAgree = 4;
+
 // Information of one segment at the minimum, along the estimated directions in
 // units of the prior (r x r, r).
 struct SegmentEvidence {
@@ -48,7 +52,7 @@ std::vector<SegmentEvidence> CollectEvidence(
 double TestEach(std::vector<SegmentEvidence>* evidence);
 
 // Tests the first half of the segments, in their order, against the second,
-// with variances scaled by `excess`. Requires at least four segments.
+// with variances scaled by `excess`. Not tested with fewer than kLeastToAgree.
 AgreementTest TestHalves(const std::vector<SegmentEvidence>& evidence,
                          double excess);
 

@@ -23,4 +23,13 @@ BodyRates CorrectImu(const ImuCalibration& imu,
       model.ForceAtOrigin(reading.f, ForceByPosition<double>(reading.w, dw_I))};
 }
 
+ImuBiases CarryBiases(const ImuCalibration& from,
+                      const ImuCalibration& to,
+                      const Eigen::Vector3d& f_I,
+                      const ImuBiases& biases) {
+  return {
+      biases.b_g + (from.T_s() - to.T_s()) * f_I,
+      biases.b_a + from.T_a() * (from.q_AI * f_I) - to.T_a() * (to.q_AI * f_I)};
+}
+
 }  // namespace selfcal

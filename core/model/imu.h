@@ -34,4 +34,19 @@ BodyRates CorrectImu(const ImuCalibration& imu,
                      const Eigen::Vector3d& dw_I =  // [rad/s^2]
                      Eigen::Vector3d::Zero());
 
+struct ImuBiases {
+  Eigen::Vector3d b_g;  // [rad/s], in I
+  Eigen::Vector3d b_a;  // [m/s^2], in A
+};
+
+// Biases for a filter that exchanges its calibration while it runs: those with
+// which readings at rest mean under `to` what they have meant under `from`,
+// where f_I is the specific force at rest (R_IG (0, 0, g)). Biases take up what
+// a calibration gets wrong: without this, a filter would have to learn them
+// again.
+ImuBiases CarryBiases(const ImuCalibration& from,
+                      const ImuCalibration& to,
+                      const Eigen::Vector3d& f_I,  // [m/s^2]
+                      const ImuBiases& biases);
+
 }  // namespace selfcal

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 namespace selfcal::server {
 namespace {
@@ -24,6 +25,35 @@ void Fill(const Advice& advice, v1::AdviseMotionResponse::Advice* to) {
   }
 }
 
+void FillParts(
+    const std::vector<UnobservedDirection::Part>& parts,
+    google::protobuf::RepeatedPtrField<v1::UnobservedDirection::Part>* to) {
+  for (const UnobservedDirection::Part& part : parts) {
+    auto* added = to->Add();
+    added->set_component(part.component);
+    added->set_weight(part.weight);
+  }
+}
+
+void Fill(const Plan& plan,
+          double segment_s,
+          v1::AdviseMotionResponse* response) {
+  for (const Lesson& lesson : plan.lessons) {
+    auto* to = response->add_lessons();
+    to->set_motion(std::string(lesson.motion));
+    to->set_instruction(std::string(lesson.instruction));
+    to->set_seconds(lesson.segments * segment_s);
+  }
+  for (const MissingDirection& missing : plan.missing) {
+    auto* to = response->add_missing();
+    to->set_words(missing.words);
+    FillParts(missing.parts, to->mutable_parts());
+    to->set_sigma_by_prior(missing.sigma);
+    to->set_sigma_by_prior_after(missing.sigma_after);
+    to->set_motion(std::string(missing.motion));
+  }
+}
+
 }  // namespace
 
 v1::AdviseMotionResponse Encode(const RigCoaching& coaching, int max_advice) {
@@ -38,12 +68,9 @@ v1::AdviseMotionResponse Encode(const RigCoaching& coaching, int max_advice) {
     auto* weak = response.add_weakest();
     weak->set_words(direction.words);
     weak->set_sigma_by_reference(direction.sigma);
-    for (const UnobservedDirection::Part& part : direction.parts) {
-      auto* added = weak->add_parts();
-      added->set_component(part.component);
-      added->set_weight(part.weight);
-    }
+    FillParts(direction.parts, weak->mutable_parts());
   }
+  Fill(coaching.plan, coaching.segment_s, &response);
   response.set_calibration_version(coaching.calibration_version);
   response.set_segments_since(coaching.segments_since);
   response.set_segment_seconds(coaching.segment_s);

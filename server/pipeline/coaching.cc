@@ -5,8 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/segment_agreement.h"
 #include "core/selection/tables.h"
 #include "server/pipeline/after_change.h"
+#include "server/pipeline/candidate_validation.h"
 #include "server/pipeline/stored_information.h"
 #include "server/status/status_macros.h"
 #include "server/store/records.h"
@@ -37,11 +39,11 @@ absl::StatusOr<std::optional<StoredChange>> NewestChange(
 // The information of the segments in the tables that the version was not
 // computed on, without what is damaged.
 absl::StatusOr<std::vector<SegmentInformation>> InformationSince(
-    Store* store, const StoredCalibration& active) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
-                           store->GetTables(active.rig));
+    Store* store,
+    const StoredCalibration& active,
+    const std::vector<TableEntry>& in_tables) {
   std::vector<SegmentKey> since;
-  for (const TableEntry& entry : UnionOfTables(tables)) {
+  for (const TableEntry& entry : in_tables) {
     const auto& used = active.segments;
     if (std::find(used.begin(), used.end(), entry.key) == used.end()) {
       since.push_back(entry.key);
@@ -58,8 +60,11 @@ absl::StatusOr<RigCoaching> RigCoach::Advise(const std::string& rig_name) {
                            store_->GetActiveCalibration(rig_name));
   SELFCAL_ASSIGN_OR_RETURN(const std::optional<StoredChange> change,
                            NewestChange(store_, rig_name));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
+                           store_->GetTables(rig_name));
+  const std::vector<TableEntry> in_tables = UnionOfTables(tables);
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
-                           InformationSince(store_, active));
+                           InformationSince(store_, active, in_tables));
   if (change && change->base_version == active.version) {
     active.covariance = CovarianceAfter(rig.rig, *change, active, since);
   }
@@ -71,7 +76,11 @@ absl::StatusOr<RigCoaching> RigCoach::Advise(const std::string& rig_name) {
         "recalibrate, or make another version active");
   }
   const Kept predictions = PredictionsFor(rig, active);
+  PlanGoal goal;
+  goal.learned_below = CandidateLimits().observed_below;
+  goal.segments = kLeastToAgree - static_cast<int>(in_tables.size());
   return RigCoaching{selfcal::Advise(rig.rig, *predictions, known),
+                     MakePlan(rig.rig, *predictions, known, goal),
                      active.version,
                      static_cast<int>(since.size()),
                      predictions->segment_s};

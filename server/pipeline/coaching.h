@@ -6,6 +6,10 @@
 // rest), and the information of the segments in the tables that the version was
 // not computed on, which the next run will use.
 //
+// What is missing is planned for with the limits of validation: a component
+// that the data determines little better than the prior is not learned, and few
+// segments confirm nothing.
+//
 // The predicted information of the motions is computed at the first request for
 // a version of a rig and kept, for the most recently requested rigs. Any thread
 // may call; one prediction is computed at a time, on the calling thread, while
@@ -22,12 +26,14 @@
 #include <string>
 
 #include "core/coach/advise.h"
+#include "core/coach/plan.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 
 struct RigCoaching {
   Coaching coaching;
+  Plan plan;
   std::int64_t calibration_version = 0;  // the active one
   int segments_since = 0;                // in the tables, which it did not use
   double segment_s = 0;                  // segment length of the gains

@@ -24,7 +24,7 @@ import sys
 import tempfile
 
 PORTS = ("7447", "7448", "9464")
-TIMEOUT_S = 240
+TIMEOUT_S = 840  # CTest has a limit for each tutorial
 
 
 def blocks(text: str):

@@ -211,6 +211,35 @@ TEST_F(CalibrationTest, AppliesItselfAsTheLibraryDoes) {
   EXPECT_EQ(Eigen::Vector3d(w_I), rates.w_I);
   EXPECT_EQ(Eigen::Vector3d(f_I), rates.f_I);
 
+  // From nothing wrong to the calibration.
+  selfcal_imu ideal = {};
+  ideal.struct_size = sizeof(ideal);
+  std::fill_n(ideal.gyro_scale, 3, 1.0);
+  std::fill_n(ideal.accel_scale, 3, 1.0);
+  ideal.q_AI.w = 1;
+  selfcal_camera camera = {};
+  camera.struct_size = sizeof(camera);
+  ASSERT_EQ(selfcal_calibration_get_camera(calibration_, 0, &camera, &error_),
+            0);
+  const selfcal_camera* const pointer = &camera;
+  selfcal_calibration* from = nullptr;
+  ASSERT_EQ(selfcal_calibration_create(&ideal, &pointer, 1, &from, &error_), 0)
+      << error_.message;
+  double carried_g[3] = {0.01, 0.02, 0.03};
+  double carried_a[3] = {0.1, 0.2, 0.3};
+  ASSERT_EQ(selfcal_calibration_carry_biases(
+                from, calibration_, accel, carried_g, carried_a, nullptr),
+            0);
+  selfcal_calibration_destroy(from);
+  const ImuBiases carried =
+      CarryBiases(ImuCalibration(),
+                  theta.imu,
+                  Eigen::Vector3d(accel),
+                  {Eigen::Vector3d(b_g), Eigen::Vector3d(b_a)});
+  EXPECT_EQ(Eigen::Vector3d(carried_g), carried.b_g);
+  EXPECT_EQ(Eigen::Vector3d(carried_a), carried.b_a);
+  EXPECT_NE(carried.b_a, Eigen::Vector3d(b_a));
+
   const double p_C[3] = {0.1, 0.2, 1};
   double z_px[2];
   double bearing_C[3];

@@ -133,6 +133,44 @@ class Calibrate(unittest.TestCase):
         )
         self.assertIn("device", listed.stdout)
 
+    def test_says_what_to_record(self) -> None:
+        output = self.folder / "asked"
+        calm = render(
+            self.folder / "calm", "--seconds", "12", "--excitation", "0.1"
+        )
+        done = calibrate(calm, output)
+        self.assertIn(done.returncode, (1, 5), done.stderr)
+        text = (output / "what_to_record.txt").read_text()
+        self.assertIn(text, done.stderr)
+        self.assertIn("missing", text)
+
+        # It is what the coach of a daemon says.
+        daemon = RunningDaemon(SELFCALD, f"{output}/state")
+        self.addCleanup(daemon.stop)
+        coached = subprocess.run(
+            [SELFCAL, "--target", daemon.target, "rig", "coach", "device",
+             "--json"],
+            capture_output=True,
+            text=True,
+            check=True,
+        )  # fmt: skip
+        advice = json.loads(coached.stdout)
+        self.assertGreater(len(advice["lessons"]), 0)
+        for lesson in advice["lessons"]:
+            self.assertIn(
+                f"record {lesson['seconds']:g} s more of this: "
+                f"{lesson['instruction']}",
+                text,
+            )
+        self.assertLess(sum(a["seconds"] for a in advice["lessons"]), SECONDS)
+        daemon.stop()
+
+        # Vigorous motion of a greater length leaves nothing missing.
+        done = calibrate(self.walk, output)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("no direction is missing", done.stderr)
+        self.check_against_truth(output)
+
     def test_continues_after_sigkill(self) -> None:
         output = self.folder / "killed"
         process = subprocess.Popen(

@@ -1,7 +1,10 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
+#include "client/cli/motion_advice.h"
 #include "test/client/cli/commands_fixture.h"
 
 namespace selfcal::client {
@@ -90,6 +93,50 @@ TEST_F(Commands, CoachWatchPrintsJsonLines) {
   const auto first = Parse<v1::AdviseMotionResponse>(
       outcome.out.substr(0, outcome.out.find('\n')));
   EXPECT_EQ(first.advice(0).motion(), "pan");
+}
+
+TEST(MissingText, SaysWhatToRecordForHowLong) {
+  v1::AdviseMotionResponse response = Advice("pan", 5);
+  EXPECT_EQ(MissingText(response),
+            "no direction is missing; 4 s of this would add most, 3.14 nat: Do "
+            "pan.\n");
+  for (const auto& [motion, seconds] :
+       {std::pair("tumble", 12), std::pair("nod", 4)}) {
+    auto* lesson = response.add_lessons();
+    lesson->set_motion(motion);
+    lesson->set_instruction(std::string("Do ") + motion + ".");
+    lesson->set_seconds(seconds);
+  }
+  EXPECT_EQ(MissingText(response),
+            "no direction is missing, but there are too few segments to "
+            "confirm a calibration:\n"
+            "  record 12 s more of this: Do tumble.\n"
+            "  record 4 s more of this: Do nod.\n");
+  for (const auto& [words, motion] : {std::pair("a", "tumble"),
+                                      std::pair("b", "nod"),
+                                      std::pair("c", ""),
+                                      std::pair("d", "tumble"),
+                                      std::pair("e", "tumble"),
+                                      std::pair("f", "tumble"),
+                                      std::pair("g", "tumble")}) {
+    auto* missing = response.add_missing();
+    missing->set_words(words);
+    missing->set_motion(motion);
+    missing->set_sigma_by_prior(0.93);
+    missing->set_sigma_by_prior_after(0.0421);
+  }
+  EXPECT_EQ(MissingText(response),
+            "7 directions are missing; in percent of the uncertainty before "
+            "any recording:\n"
+            "  record 12 s more of this: Do tumble.\n"
+            "    a: 93 % -> 4.2 %\n"
+            "    d: 93 % -> 4.2 %\n"
+            "    e: 93 % -> 4.2 %\n"
+            "    and 2 more\n"
+            "  record 4 s more of this: Do nod.\n"
+            "    b: 93 % -> 4.2 %\n"
+            "  no motion teaches this: hold it fixed, or state it better:\n"
+            "    c: 93 %\n");
 }
 
 TEST_F(Commands, CoachSaysWhatTheDaemonRefuses) {

@@ -54,7 +54,7 @@ diff <(sed 's/@.*//' "$work/symbols") "$work/declared" || {
 }
 
 echo 'library: what applies a calibration is in it'
-for function in CorrectImu Project Unproject; do
+for function in CarryBiases CorrectImu Project Unproject; do
   nm -DC --defined-only "$library" | grep " selfcal::$function(" >/dev/null || {
     echo "FAILED: libselfcal has no $function" >&2
     exit 1
@@ -137,4 +137,25 @@ for program in stream_recording_c stream_recording_cxx11 \
   [[ $shown == *'calibration 1 is active'* ]]
   [[ $shown == *'segments: 4 stored, 0 known already, 0 rejected' ]]
 done
+echo 'example: a filter, which exchanges its calibration'
+sed 's/packaged/filter/g' "$work/rig.json" >"$work/filter.json"
+"$selfcal" rig create "$work/filter.json" >/dev/null
+shown=$("$work/build/stream_filter" "$SELFCAL_TARGET" filter "$work" 5 |
+  tee /dev/stderr)
+[[ $shown == *'version 1 is applied'*'segments: 4 stored, 0 rejected'* ]]
+[[ $shown =~ tracks:\ ([0-9]+)\ triangulated,\ ([0-9]+)\ dropped ]]
+((BASH_REMATCH[1] > 10 * BASH_REMATCH[2]))
+"$selfcal" run start filter --force >/dev/null
+"$work/build/stream_filter" "$SELFCAL_TARGET" filter "$work" 5 0.5 \
+  >"$work/shown" &
+example=$!
+for _ in $(seq 100); do
+  grep -q 'version 2 is applied' "$work/shown" && break
+  sleep 0.05
+done
+"$selfcal" calibration activate filter 1 --reason 'seen by the example' \
+  >/dev/null
+wait "$example"
+cat "$work/shown"
+[[ $(<"$work/shown") == *'version 2 is applied'*'version 1 is applied'* ]]
 echo 'passed'

@@ -61,5 +61,27 @@ TEST(CorrectImu, InvertsTheReadingsOfSensorsThatAreCoupled) {
   }
 }
 
+// The second calibration corrects the same readings to the same values.
+TEST(CarryBiases, KeepsWhatReadingsAtRestMean) {
+  RandomValues random(3);
+  for (int trial = 0; trial < 100; ++trial) {
+    ImuCalibration from = random.Theta().imu;
+    ImuCalibration to = random.Theta().imu;
+    if (trial % 2 == 0) from.gyro_g_sensitivity = random.Vector(9, 1e-2);
+    if (trial % 3 == 0) to.gyro_g_sensitivity = random.Vector(9, 1e-2);
+    if (trial % 5 == 0) to.accel_position = random.Vector(9, 0.1);
+    const Eigen::Vector3d f_I = random.Vector(3, 10);
+    const ImuBiases old{random.Vector(3, 0.05), random.Vector(3, 0.5)};
+    const Eigen::Vector3d accel =
+        from.T_a() * from.q_AI.toRotationMatrix() * f_I + old.b_a;
+    const Eigen::Vector3d gyro = from.T_s() * f_I + old.b_g;
+    const ImuBiases carried = CarryBiases(from, to, f_I, old);
+    const BodyRates rates =
+        CorrectImu(to, gyro, accel, carried.b_g, carried.b_a);
+    EXPECT_LT(rates.w_I.norm(), 1e-12);
+    EXPECT_LT((rates.f_I - f_I).norm(), 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace selfcal

@@ -1,3 +1,6 @@
+#include <set>
+#include <string>
+
 #include "core/coach/primitives.h"
 #include "test/server/grpc/service_test.h"
 
@@ -51,6 +54,33 @@ TEST_F(AdviseMotionTest, SaysWhatToDoAndWhatItBrings) {
     EXPECT_FALSE(weak.words().empty());
     EXPECT_GE(weak.parts_size(), 1);
     EXPECT_NEAR(weak.sigma_by_reference(), 10, 1e-6);
+  }
+}
+
+// Of a new device everything is missing, and less than a minute teaches it.
+TEST_F(AdviseMotionTest, SaysWhatToRecordForHowLong) {
+  const Rig rig = AddRig();
+  ASSERT_TRUE(Advise("rigs/r").ok());
+  std::set<std::string> motions;
+  double seconds = 0;
+  for (const auto& lesson : response_.lessons()) {
+    ASSERT_NE(FindPrimitive(lesson.motion()), nullptr);
+    EXPECT_EQ(lesson.instruction(),
+              FindPrimitive(lesson.motion())->instruction);
+    EXPECT_GE(lesson.seconds(), response_.segment_seconds());
+    motions.insert(lesson.motion());
+    seconds += lesson.seconds();
+  }
+  EXPECT_GT(seconds, 0);
+  EXPECT_LT(seconds, 60);
+  ASSERT_EQ(response_.missing_size(),
+            static_cast<int>(FreeComponents(rig).size()));
+  for (const auto& missing : response_.missing()) {
+    EXPECT_FALSE(missing.words().empty());
+    EXPECT_GE(missing.parts_size(), 1);
+    EXPECT_NEAR(missing.sigma_by_prior(), 1, 1e-6);
+    EXPECT_LE(missing.sigma_by_prior_after(), 0.5);
+    EXPECT_TRUE(motions.contains(missing.motion()));
   }
 }
 
