@@ -203,6 +203,7 @@ inline std::string NotExpressible(const Calibration& calibration,
     if (camera.rolling_shutter != 0) {
       return name + " has a rolling shutter";
     }
+    if (camera.clock_drifts != 0) return name + " has a clock that drifts";
     if (std::abs(camera.time_offset_s - time_offset_s) > 1e-4) {
       return name + " has another time offset than camera 0";
     }
