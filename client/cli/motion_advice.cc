@@ -73,8 +73,7 @@ std::string MissingText(const v1::AdviseMotionResponse& response) {
   std::string text =
       response.missing().empty()
           ? "no direction is missing, but there are too few segments to "
-            "confirm "
-            "a calibration:\n"
+            "confirm a calibration:\n"
           : fmt::format(
                 "{} missing; in percent of the uncertainty before any "
                 "recording:\n",

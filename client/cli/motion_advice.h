@@ -1,4 +1,4 @@
-// What the coach says, for the commands that show it.
+// The coach's advice, for the commands that show it.
 #pragma once
 
 #include <grpcpp/support/status.h>

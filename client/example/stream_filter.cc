@@ -33,7 +33,7 @@ namespace {
 
 namespace sc = selfcal::client;
 
-// What the filter says of one image.
+// The filter's output for one image.
 struct FilterOutput {
   std::int64_t camera_stamp_ns = 0;  // on the camera's clock
   selfcal::KeyframeState state;      // at the exposure, on the IMU's clock

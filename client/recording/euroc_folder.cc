@@ -32,7 +32,7 @@ fs::path RootOf(const std::string& folder) {
   return IsFolder(mav) ? mav : fs::path(folder);
 }
 
-// What the sensor.yaml of a folder states; nullopt if there is none.
+// Reads the sensor.yaml of a folder; nullopt if there is none.
 template <class Stated>
 absl::StatusOr<std::optional<Stated>> ReadSensor(
     const fs::path& folder,

@@ -102,8 +102,8 @@ inline constexpr double kSameTime_s = 2e-3;
 // All images, in order of time.
 std::vector<ImageSet> ImageSets(const Recording& recording);
 
-// By how much the stamps within a set differ, in one sentence for people, for a
-// recording in which any do.
+// Says in one sentence how much the stamps within a set differ; nullopt if none
+// do.
 std::optional<std::string> StampDifferences(const Recording& recording);
 
 // Topics of a bag. Those that are not stated are found by their types: each

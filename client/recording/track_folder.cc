@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of one camera: the points of each image, by time.
+// The points of each image of one camera, by time.
 using PointsByTime = std::map<std::int64_t, std::vector<RecordedPoint>>;
 
 // Sorts points by landmark, keeps the first of each, and returns the number of

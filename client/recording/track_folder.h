@@ -1,9 +1,8 @@
-// A recording of tracks instead of images: what any SLAM system can write that
-// has a front end of its own.
+// A recording of tracks instead of images: any SLAM system with a front end of
+// its own can write one.
 //
 //   tracks.csv   time [ns], camera, landmark, x, y [px]; in any order
-//   imu.csv      time [ns], gyroscope x y z [rad/s], accelerometer x y z
-//   [m/s^2]
+//   imu.csv      as of csv_list.h
 //
 // Cameras are numbered from 0. A landmark is a number that means the same point
 // of the scene in all images and cameras. Pixels are those of the original,

@@ -79,7 +79,7 @@ class Landmarks {
   }
 
   // Triangulates the landmarks without a position, and removes those that have
-  // none then. `segment` has its keyframes.
+  // none then. `segment` has its keyframes and samples.
   void CompletePositions(const ClosedSegment& closed,
                          const MotionSegment& segment,
                          AssemblyStatistics* statistics) {
@@ -119,13 +119,8 @@ class Landmarks {
   void Triangulate(const ClosedSegment& closed, const MotionSegment& segment) {
     const std::vector<Track> tracks =
         TracksWithoutPosition(closed.theta->cameras.size());
-    std::vector<KeyframeContext> contexts;
-    for (const KeyframeState& x : segment.keyframes) {
-      contexts.push_back({closed.imu, SessionTime(segment, x)});
-    }
     const auto positions = TriangulateTracks(*closed.theta,
-                                             segment.keyframes,
-                                             contexts,
+                                             segment,
                                              tracks,
                                              closed.pixel_sigma_px,
                                              closed.gravity_mps2);

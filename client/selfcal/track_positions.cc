@@ -47,22 +47,21 @@ std::optional<Eigen::Vector3d> TriangulateOne(const LandmarkScene& scene,
 
 std::vector<std::optional<Eigen::Vector3d>> TriangulateTracks(
     const Calibration& theta,
-    std::span<const KeyframeState> keyframes,
-    std::span<const KeyframeContext> contexts,
+    const MotionSegment& segment,
     std::span<const Track> tracks,
     double pixel_sigma_px,
     double gravity_mps2) {
   Rig rig;
   rig.gravity_mps2 = gravity_mps2;
   KeyframeMotions motions;
-  if (!contexts.empty()) {
+  if (!segment.imu.empty()) {
     motions.Measure(rig,
                     theta,
                     std::vector<char>(theta.cameras.size(), 0),
-                    keyframes,
-                    [&](std::size_t k) { return contexts[k]; });
+                    segment.keyframes,
+                    [&](std::size_t k) { return ContextOf(segment, k); });
   }
-  const LandmarkScene scene(theta, keyframes, motions, pixel_sigma_px);
+  const LandmarkScene scene(theta, segment.keyframes, motions, pixel_sigma_px);
   std::vector<std::optional<Eigen::Vector3d>> positions;
   positions.reserve(tracks.size());
   for (const Track& track : tracks) {

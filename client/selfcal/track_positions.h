@@ -14,15 +14,15 @@
 
 namespace selfcal::client {
 
-// Returns the position of each track in G [m], with keyframes and theta held
-// constant, and exposures at the timestamps if there are no contexts; nullopt
-// if its observations do not determine it (Assemble states the limits). Their
-// cameras must be those of theta; observations are in the order of keyframe and
-// camera.
+// Returns the position of each track in G [m], with the keyframes of the
+// segment and theta held constant; nullopt if its observations do not determine
+// it (Assemble states the limits). The samples of the segment move the
+// keyframes to the exposures; without any, exposures are at the timestamps.
+// Their cameras must be those of theta; observations are in the order of
+// keyframe and camera.
 std::vector<std::optional<Eigen::Vector3d>> TriangulateTracks(
     const Calibration& theta,
-    std::span<const KeyframeState> keyframes,
-    std::span<const KeyframeContext> contexts,
+    const MotionSegment& segment,
     std::span<const Track> tracks,
     double pixel_sigma_px,
     double gravity_mps2);

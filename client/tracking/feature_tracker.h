@@ -49,7 +49,8 @@ struct TrackerOptions {
   bool align = true;
   double min_correlation = 0.8;  // of the greys of both patches
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();  // [rad/s]
-  // From which on the clocks of cameras drift; by default the first image.
+  // The time from which on the clocks of cameras drift; by default that of the
+  // first image.
   std::optional<std::int64_t> session_start_ns = std::nullopt;
 };
 

@@ -170,6 +170,10 @@ struct OffsetShift {
   double shift_s;
 };
 
+// Shifts nearer to each other say nothing about a drift: they err by up to 2 ms
+// (time_offset.h), and two quartz clocks drift by less than 2 ms in this time.
+constexpr double kLeastApart_s = 30;
+
 // Moves the time offsets of theta by the median of the shifts, and its time
 // drifts, if every camera has one, by the median slope between any two.
 void MoveClocks(const std::vector<OffsetShift>& shifts, Calibration* theta) {
@@ -180,8 +184,9 @@ void MoveClocks(const std::vector<OffsetShift>& shifts, Calibration* theta) {
   std::vector<double> slopes;
   for (const OffsetShift& a : shifts) {
     for (const OffsetShift& b : shifts) {
-      if (!drifts || !(a.session_s < b.session_s)) continue;
-      slopes.push_back((b.shift_s - a.shift_s) / (b.session_s - a.session_s));
+      const double apart_s = b.session_s - a.session_s;
+      if (!drifts || apart_s < kLeastApart_s) continue;
+      slopes.push_back((b.shift_s - a.shift_s) / apart_s);
     }
   }
   const double drift = slopes.empty() ? 0 : UpperMedian(std::move(slopes));

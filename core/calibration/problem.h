@@ -54,8 +54,8 @@ struct BiasLink {
 
 struct CalibrationProblem {
   std::vector<KeyframeState> keyframes;  // as the SLAM system estimated them
-  // Of each keyframe. The samples are those of its segment, which must outlive
-  // them.
+  // One for each keyframe. The samples are those of its segment, which must
+  // outlive them.
   std::vector<KeyframeContext> contexts;
   // First keyframe of each set of chains that share landmarks: holds the gauge.
   std::vector<int> gauge_keyframes;

@@ -122,7 +122,7 @@ class Planner {
     return missing;
   }
 
-  // Of what the parts name, which is not all of the direction.
+  // The part of the direction that the parts name.
   Eigen::VectorXd VectorOf(const UnobservedDirection& direction) const {
     Eigen::VectorXd vector = Eigen::VectorXd::Zero(limits_.size());
     const auto& names = components_.free_names();

@@ -1,7 +1,7 @@
-// What is still to be recorded until the data determines every direction of
-// theta, and is enough to confirm a calibration, with the predicted information
-// of the motions: segment by segment the motion that teaches most of what is
-// missing and, once nothing is, the one with the largest gain.
+// A plan of the motions that are still to be recorded until the data determines
+// every direction of theta and is enough to confirm a calibration, with their
+// predicted information: segment by segment the motion that teaches most of
+// what is missing and, once nothing is, the one with the largest gain.
 //
 // A direction is missing while its standard deviation, in units of the prior's,
 // is above a limit. The sum of the information of all planned segments is what

@@ -48,7 +48,7 @@ struct ReadoutMotion {
   double rate_share = 1;
 };
 
-// What is known about a keyframe beside its state.
+// Facts about a keyframe beside its state.
 struct KeyframeContext {
   std::span<const ImuSample> samples;  // about its time
   double session_s = 0;                // its time since the session began

@@ -1,5 +1,6 @@
 #include "core/model/calibration.h"
 
+#include <algorithm>
 #include <cassert>
 #include <optional>
 #include <type_traits>
@@ -116,6 +117,13 @@ int CameraTangentOffset(const Calibration& theta, int camera) {
     offset += CameraTangentSize(theta.cameras[j]);
   }
   return offset;
+}
+
+bool HasTimeDrift(const Calibration& theta) {
+  return std::any_of(
+      theta.cameras.begin(),
+      theta.cameras.end(),
+      [](const CameraCalibration& camera) { return camera.time_drift; });
 }
 
 int TimeOffsetComponent(const Calibration& theta, int camera) {

@@ -102,6 +102,9 @@ int ImuTangentSize(const ImuCalibration& imu);
 // Dimension of the tangent of camera j, and its offset in that of theta.
 int CameraTangentSize(const CameraCalibration& camera);
 int CameraTangentOffset(const Calibration& theta, int camera);
+// Whether the clock of any camera drifts (CameraCalibration::time_drift).
+bool HasTimeDrift(const Calibration& theta);
+
 // Index of the time offset of camera j, which line delay and drift follow.
 int TimeOffsetComponent(const Calibration& theta, int camera);
 

@@ -89,9 +89,8 @@ struct MotionSegment {
                                           // (keyframe, camera, landmark)
   // Temperature of the device in degrees Celsius, if known.
   std::optional<double> temperature_c = std::nullopt;
-  // The time at which the session began, from which a drift of its clocks
-  // counts: the same for all of its segments. Needed by a calibration that has
-  // a time drift.
+  // The time at which the session began and its clocks began to drift: the same
+  // for all of its segments. Needed by a calibration that has a time drift.
   std::optional<std::int64_t> session_start_ns = std::nullopt;
 };
 
@@ -138,6 +137,7 @@ struct SegmentLimits {
   double min_temperature_c = -100;
   double max_temperature_c = 200;
   double max_session_s = 30 * 86400.0;  // from its begin to a keyframe
+  double max_clock_offset_s = 0.5;      // of a camera whose clock drifts, then
   int max_violations = 100;  // the list is truncated here; one more entry,
                              // without a field, reports that
 };

@@ -1,5 +1,6 @@
 // Validation of a motion segment, with one function for each part.
 #include <algorithm>
+#include <cmath>
 #include <compare>
 #include <cstdint>
 #include <string>
@@ -68,45 +69,58 @@ void CheckTemperature(const MotionSegment& segment,
                 "leave it out");
 }
 
-// Differences to keyframes do not overflow if the time is in range, and a
-// calibration whose clocks drift needs it.
+// Where the clocks are further apart than a constant offset may be, a session
+// has lasted too long.
+void CheckClocks(const Calibration& theta,
+                 double session_s,
+                 const SegmentLimits& limits,
+                 ViolationList* list) {
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    if (!theta.cameras[j].time_drift) continue;
+    const double apart_s = TimeOffsetAt(theta.cameras[j], session_s);
+    if (std::abs(apart_s) <= limits.max_clock_offset_s) continue;
+    list->Add("session_start_ns",
+              "is so long ago that the clock of cam" + std::to_string(j) +
+                  " is off by " + std::to_string(apart_s) +
+                  " s; begin a new session when the clocks are set");
+  }
+}
+
 void CheckSessionStart(const MotionSegment& segment,
                        const Calibration& theta,
                        const SegmentLimits& limits,
                        ViolationList* list) {
-  constexpr std::string_view kField = "session_start_ns";
+  const auto add = [&](std::string message) {
+    list->Add("session_start_ns", std::move(message));
+  };
   if (!segment.session_start_ns) {
-    const bool drifts = std::any_of(
-        theta.cameras.begin(),
-        theta.cameras.end(),
-        [](const CameraCalibration& camera) { return camera.time_drift; });
-    if (drifts) {
-      list->Add(std::string(kField),
-                "is missing, and the rig has cameras with a time drift; send "
-                "the time at which the session began, the same for all of its "
-                "segments");
+    if (HasTimeDrift(theta)) {
+      add("is missing, and the rig has cameras with a time drift; send the "
+          "time at which the session began, the same for all of its segments");
     }
     return;
   }
+  // Differences to a time in range do not overflow.
   const std::int64_t start_ns = *segment.session_start_ns;
   if (!TimeInRange(start_ns)) {
-    list->Add(std::string(kField),
-              std::to_string(start_ns) + " ns is out of range");
+    add(std::to_string(start_ns) + " ns is out of range");
     return;
   }
-  if (segment.keyframes.empty() ||
-      !TimeInRange(segment.keyframes.front().t_ns)) {
+  if (segment.keyframes.empty()) return;
+  const std::int64_t first_ns = segment.keyframes.front().t_ns;
+  if (!TimeInRange(first_ns)) return;
+  if (first_ns < start_ns) {
+    add("is later than the first keyframe");
     return;
   }
-  const double age_s = Seconds(start_ns, segment.keyframes.front().t_ns);
-  if (segment.keyframes.front().t_ns < start_ns) {
-    list->Add(std::string(kField), "is later than the first keyframe");
-  } else if (age_s > limits.max_session_s) {
-    list->Add(std::string(kField),
-              "is " + std::to_string(age_s) +
-                  " s before the first keyframe; begin a new session when the "
-                  "clocks are set");
+  const double session_s = Seconds(start_ns, first_ns);
+  if (session_s > limits.max_session_s) {
+    add("is " + std::to_string(session_s) +
+        " s before the first keyframe; begin a new session when the clocks are "
+        "set");
+    return;
   }
+  CheckClocks(theta, session_s, limits, list);
 }
 
 // Adds a violation and returns false if the list must not be inspected.

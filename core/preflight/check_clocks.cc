@@ -4,6 +4,7 @@
 // the session began.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -51,11 +52,18 @@ Drift FitDrift(const std::vector<OffsetAtTime>& offsets) {
   return {drift, std::sqrt(scatter / (count - 2) / square)};
 }
 
-double Span(const std::vector<double>& times_s) {
-  if (times_s.empty()) return 0;
+using Segments = std::vector<const MotionSegment*>;
+
+double SessionTimeOf(const MotionSegment* segment) {
+  return SessionTime(*segment, segment->keyframes.front());
+}
+
+// The time between the earliest and the latest segment of their sessions.
+double Span(const Segments& segments) {
+  if (segments.empty()) return 0;
   const auto [first, last] =
-      std::minmax_element(times_s.begin(), times_s.end());
-  return *last - *first;
+      std::ranges::minmax(segments, std::less<>(), SessionTimeOf);
+  return SessionTimeOf(last) - SessionTimeOf(first);
 }
 
 std::string PerSecond(double drift) { return Figure(1e6 * drift) + " us"; }
@@ -65,27 +73,22 @@ std::string PerSecond(double drift) { return Figure(1e6 * drift) + " us"; }
 void CheckClocks(const Calibration& theta,
                  std::span<const MotionSegment> segments,
                  Diagnosis* diagnosis) {
-  const bool drifts = std::any_of(
-      theta.cameras.begin(),
-      theta.cameras.end(),
-      [](const CameraCalibration& camera) { return camera.time_drift; });
-  if (drifts) return;
-  std::vector<const MotionSegment*> dated;
-  std::vector<double> times_s;
+  if (HasTimeDrift(theta)) return;
+  Segments dated, turning;
   for (const MotionSegment& segment : segments) {
-    if (!segment.session_start_ns || segment.keyframes.empty()) continue;
-    dated.push_back(&segment);
-    times_s.push_back(SessionTime(segment, segment.keyframes.front()));
+    if (segment.session_start_ns && !segment.keyframes.empty()) {
+      dated.push_back(&segment);
+    }
   }
-  if (Span(times_s) < kMinSpan_s) return;
+  if (Span(dated) < kMinSpan_s) return;
   std::vector<OffsetAtTime> offsets;
-  for (std::size_t i = 0; i < dated.size(); ++i) {
-    const auto found = EstimateTimeOffset(theta, std::span(dated[i], 1));
-    if (found) offsets.push_back({times_s[i], found->offset_s});
+  for (const MotionSegment* segment : dated) {
+    const auto found = EstimateTimeOffset(theta, std::span(segment, 1));
+    if (!found) continue;
+    turning.push_back(segment);
+    offsets.push_back({SessionTimeOf(segment), found->offset_s});
   }
-  times_s.clear();
-  for (const OffsetAtTime& at : offsets) times_s.push_back(at.session_s);
-  const double span_s = Span(times_s);
+  const double span_s = Span(turning);
   if (offsets.size() < kMinSegments || span_s < kMinSpan_s) {
     diagnosis->not_checked.push_back(
         "drift of the clocks: the device hardly turns in all but " +

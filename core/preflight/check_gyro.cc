@@ -215,8 +215,9 @@ class GyroCheck {
     const OffsetFit& fit = best.offset;
     const double tolerance_s =
         std::max(kLeastTimeOffset_s, kOffsetSigmas * fit.sigma_s);
-    if (IsStatedOffset(theta_, data_.session_s, fit.offset_s, tolerance_s))
+    if (IsStatedOffset(theta_, data_.session_s, fit.offset_s, tolerance_s)) {
       return;
+    }
     const std::string ms = Figure(1e3 * std::abs(fit.offset_s)) + " ms";
     const bool late = fit.offset_s > 0;
     diagnosis_->findings.push_back(

@@ -39,7 +39,7 @@ struct Errors {
   double sigmas = 0;    // of the velocity, squared and normalised
 };
 
-// What was seen at one time.
+// The points of one time.
 struct Images {
   double timestamp = 0;
   std::vector<int> cameras;

@@ -15,21 +15,9 @@ if [[ ! -d $openvins/ov_msckf || ! -d $openvins_build ]]; then
   exit 77
 fi
 
-work=$(mktemp -d)
-daemon=
-cleanup() {
-  if [[ -n $daemon ]]; then
-    kill "$daemon" 2>/dev/null || true
-    wait "$daemon" 2>/dev/null || true
-  fi
-  rm -rf "$work"
-}
-trap cleanup EXIT
-
-for component in library development; do
-  cmake --install "$build" --prefix "$work/prefix" --component "$component" \
-    >/dev/null
-done
+# shellcheck source=test/client/package/private_library.sh
+source "$source/test/client/package/private_library.sh"
+install_library "$build"
 if ! {
   cmake -S "$source/client/adapters/openvins" -B "$work/build" \
     -DCMAKE_PREFIX_PATH="$work/prefix" -DOPENVINS_DIR="$openvins" \
@@ -121,13 +109,7 @@ sed -E -e 's/\[1\.002, 0\.001.*/[1.0, 0.0, 0.0]/;s/\[0\.0, 0\.998.*/[0.0, 1.0, 0
   -e 's/\[1\.003, -0\.002.*/[1.0, 0.0, 0.0]/;s/\[0\.0, 0\.997.*/[0.0, 1.0, 0.0]/' \
   "$work/truth/kalibr_imu_chain.yaml" >"$work/start/kalibr_imu_chain.yaml"
 
-"$selfcald" --state-dir "$work/state" 2>"$work/daemon.log" &
-daemon=$!
-export SELFCAL_TARGET=unix:$work/state/selfcald.sock
-for _ in $(seq 300); do
-  grep -q ready "$work/daemon.log" && break
-  sleep 0.1
-done
+start_daemon "$selfcald"
 "$selfcal" rig create --from openvins --id vins \
   "$work/start/kalibr_imucam_chain.yaml" "$work/start/kalibr_imu_chain.yaml" \
   --block 'cam0.time_offset=on' --prior-sigma 'cam0.time_offset=0.02' >/dev/null

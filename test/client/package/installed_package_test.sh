@@ -7,21 +7,9 @@
 set -euo pipefail
 build=$1 source=$2 selfcald=$3 selfcal=$4 writer=$5
 
-work=$(mktemp -d)
-daemon=
-cleanup() {
-  if [[ -n $daemon ]]; then
-    kill "$daemon" 2>/dev/null || true
-    wait "$daemon" 2>/dev/null || true
-  fi
-  rm -rf "$work"
-}
-trap cleanup EXIT
-
-for component in library development; do
-  cmake --install "$build" --prefix "$work/prefix" --component "$component" \
-    >/dev/null
-done
+# shellcheck source=test/client/package/private_library.sh
+source "$source/test/client/package/private_library.sh"
+install_library "$build"
 
 echo 'headers: only what the package may know'
 if grep -rnE '#include [<"](grpc|google|client/|core/|proto/|server/)' \
@@ -109,13 +97,7 @@ LD_LIBRARY_PATH=$(dirname "$library")
 
 echo 'example: streams a recording'
 "$writer" "$work"
-"$selfcald" --state-dir "$work/state" 2>"$work/daemon.log" &
-daemon=$!
-export SELFCAL_TARGET=unix:$work/state/selfcald.sock
-for _ in $(seq 300); do
-  grep -q ready "$work/daemon.log" && break
-  sleep 0.1
-done
+start_daemon "$selfcald"
 "$selfcal" rig create "$work/rig.json" >/dev/null
 first=$("$work/build/stream_recording" "$SELFCAL_TARGET" packaged "$work" \
   "$work/spool" | tee /dev/stderr | tail -n 1)

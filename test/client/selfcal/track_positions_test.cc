@@ -43,9 +43,10 @@ class TrackPositions : public ::testing::Test {
   }
 
   std::optional<Eigen::Vector3d> Position(const Track& track) const {
+    MotionSegment segment;
+    segment.keyframes = keyframes_;
     return TriangulateTracks(theta_,
-                             keyframes_,
-                             {},
+                             segment,
                              std::vector<Track>{track},
                              kSigma_px,
                              kGravity_mps2)
@@ -121,13 +122,8 @@ TEST_F(TrackPositions, AreThoseOfTheExposures) {
   for (const Observation& o : truth.observations) {
     tracks[o.landmark].observations.push_back({o.keyframe, o.camera, o.z_px});
   }
-  const auto positions = TriangulateTracks(
-      theta,
-      truth.keyframes,
-      std::vector<KeyframeContext>(truth.keyframes.size(), {truth.imu}),
-      tracks,
-      kSigma_px,
-      kGravity_mps2);
+  const auto positions =
+      TriangulateTracks(theta, truth, tracks, kSigma_px, kGravity_mps2);
   int found = 0;
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!positions[i]) continue;

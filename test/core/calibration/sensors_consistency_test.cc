@@ -110,11 +110,11 @@ TEST_P(RollingShutter, IsFoundWithItsLineDelay) {
 
 // Drifts of 20 and 100 parts in a million, of a rig that believes in none: five
 // minutes after the session began, clocks are 6 and 30 ms apart.
-class ClockDrift : public testing::TestWithParam<int> {};
+class Drifts : public testing::TestWithParam<int> {};
 
-INSTANTIATE_TEST_SUITE_P(Drifts, ClockDrift, testing::Values(20, -100));
+INSTANTIATE_TEST_SUITE_P(ClockDrift, Drifts, testing::Values(20, -100));
 
-TEST_P(ClockDrift, IsFoundWithTheTimeOffset) {
+TEST_P(Drifts, AreFoundWithTheTimeOffset) {
   Calibration truth = RigOfCameras(1).factory;
   truth.cameras[0].time_offset_s = 0.004;
   truth.cameras[0].time_drift = 1e-6 * GetParam();
@@ -134,6 +134,21 @@ TEST_P(ClockDrift, IsFoundWithTheTimeOffset) {
     EXPECT_LT(std::abs(errors.error(last)), 3.3 * sigma);
     EXPECT_LT(sigma, 2e-6);
     return errors;
+  });
+}
+
+// Segments of 12 s that all show an offset of 30 ms.
+TEST(ClockDrift, InAShortSessionIsKnownAsWellAsIsClaimed) {
+  Calibration truth = RigOfCameras(1).factory;
+  truth.cameras[0].time_offset_s = 0.03;
+  truth.cameras[0].time_drift = 0;
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = RigOfCameras(1);
+    rig.factory.cameras[0].time_drift = 0;
+    rig.factory = PerturbCalibration(rig.factory, {}, seed);
+    rig.blocks = {{"*.time_offset", true}};
+    rig.groups = DefaultGroups(rig.blocks, rig.factory);
+    return CalibrateSimulated(rig, truth, seed);
   });
 }
 

@@ -248,6 +248,9 @@ TEST(ValidateSegment, ClocksThatDriftNeedTheBeginOfTheSession) {
     segment.session_start_ns = start_ns;
     EXPECT_THAT(Validate(segment, theta), IsEmpty()) << start_ns;
   }
+  theta.cameras[0].time_offset_s = 0.01;
+  theta.cameras[0].time_drift = 2e-4;
+  expect("is off by 0.73");
   theta.cameras[0].time_drift.reset();
   segment.session_start_ns = first_ns + 1;
   expect("is later than the first keyframe");
