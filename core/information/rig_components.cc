@@ -6,16 +6,14 @@
 namespace selfcal {
 
 RigComponents::RigComponents(const Rig& rig)
-    : group_settings_(rig.groups),
+    : factory_(rig.factory),
+      group_settings_(rig.groups),
       prior_sigmas_(rig.prior_sigmas),
       fixed_(rig.fixed),
       blocks_(rig.blocks),
       free_(FreeComponents(rig)),
       prior_(PriorSigmas(rig)),
       estimated_time_offsets_(EstimatedTimeOffsets(rig)) {
-  for (const CameraCalibration& camera : rig.factory.cameras) {
-    models_.push_back(camera.model);
-  }
   const std::vector<TangentComponent> components =
       TangentComponents(rig.factory);
   const Eigen::VectorXd reference = ReferenceSigmas(rig);
@@ -41,16 +39,18 @@ bool RigComponents::Fits(const Rig& rig) const {
                                const ComponentSetting& b) {
     return a.pattern == b.pattern && a.value == b.value;
   };
-  const auto same_model = [](DistortionModel model,
-                             const CameraCalibration& camera) {
-    return model == camera.model;
+  // Sigmas in pixels depend on the resolution.
+  const auto same_width = [](const CameraCalibration& a,
+                             const CameraCalibration& b) {
+    return a.width_px == b.width_px;
   };
-  return !models_.empty() && fixed_ == rig.fixed && blocks_ == rig.blocks &&
-         std::equal(models_.begin(),
-                    models_.end(),
+  return !factory_.cameras.empty() && fixed_ == rig.fixed &&
+         blocks_ == rig.blocks && SameShape(factory_, rig.factory) &&
+         std::equal(factory_.cameras.begin(),
+                    factory_.cameras.end(),
                     rig.factory.cameras.begin(),
                     rig.factory.cameras.end(),
-                    same_model) &&
+                    same_width) &&
          std::equal(group_settings_.begin(),
                     group_settings_.end(),
                     rig.groups.begin(),

@@ -36,8 +36,9 @@ class RigComponents {
   const std::vector<Group>& groups() const { return groups_; }
 
  private:
-  // Settings from which all of this is derived.
-  std::vector<DistortionModel> models_;
+  // Settings from which all of this is derived; of the factory calibration the
+  // shape and the sizes of images.
+  Calibration factory_;
   std::vector<ParameterGroup> group_settings_;
   std::vector<ComponentSetting> prior_sigmas_;
   std::vector<std::string> fixed_;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/information/segment_scorer.h"
 #include "core/simulation/simulate.h"
 #include "test/core/information/test_segments.h"
 
@@ -48,6 +49,32 @@ void ExpectNoBetter(const SegmentInformation& less,
 
 SegmentInformation Score(const Rig& rig, const MotionSegment& segment) {
   return ScoreSegment(rig, rig.factory, segment);
+}
+
+// A daemon scores the segments of all of its rigs with one workspace.
+TEST(SegmentScorer, ServesRigsThatDifferInNothingButTheirShape) {
+  const Rig plain = HandheldRig("plain");
+  Rig rolling = plain;
+  rolling.factory.cameras[0].line_delay_s = 3e-5;
+  Rig fine = plain;  // twice the pixels
+  CameraCalibration& camera = fine.factory.cameras[0];
+  camera.width_px *= 2;
+  camera.height_px *= 2;
+  camera.f *= 2;
+  camera.c *= 2;
+  SegmentScorer scorer;
+  for (const Rig& rig : {plain, rolling, fine, plain}) {
+    const MotionSegment segment = MovingSegment(rig, 3);
+    SegmentInformation shared;
+    scorer.Score(rig, rig.factory, segment, {}, &shared);
+    const SegmentInformation own = ScoreSegment(rig, rig.factory, segment);
+    EXPECT_EQ(shared.Lambda, own.Lambda);
+    ASSERT_EQ(shared.groups.size(), own.groups.size());
+    for (std::size_t q = 0; q < own.groups.size(); ++q) {
+      EXPECT_EQ(shared.groups[q].entropy, own.groups[q].entropy);
+      EXPECT_EQ(shared.groups[q].size, own.groups[q].size);
+    }
+  }
 }
 
 TEST(ScoreSegment, DoesNotDependOnTheKeyframeThatHoldsTheGauge) {
