@@ -8,6 +8,7 @@
 
 #include "core/model/camera_model.h"
 #include "core/model/parameter_blocks.h"
+#include "core/model/temperature.h"
 #include "proto/convert.h"
 
 namespace selfcal {
@@ -240,26 +241,19 @@ void ReadDistortion(const v1::CameraCalibration& message,
       Eigen::Map<const Eigen::VectorXd>(message.distortion().data(), size);
 }
 
-template <class Sensor, class Blocks>
-void FillSensor(const Blocks& blocks,
-                const Sensor& sensor,
-                google::protobuf::Message* message) {
-  VisitSensorBlocks(
-      blocks,
-      [&](const BlockInfo& info, const auto& value) {
-        FillBlock(info, value, message);
-      },
-      sensor);
+template <class Sensor>
+void FillSensor(const Sensor& sensor, google::protobuf::Message* message) {
+  VisitWithSlopes([&](const BlockInfo& info,
+                      const auto& value) { FillBlock(info, value, message); },
+                  sensor);
 }
 
-template <class Sensor, class Blocks>
-void ReadSensor(const Blocks& blocks,
-                const google::protobuf::Message& message,
+template <class Sensor>
+void ReadSensor(const google::protobuf::Message& message,
                 const std::string& prefix,
                 Sensor* sensor,
                 Violations* violations) {
-  VisitSensorBlocks(
-      blocks,
+  VisitWithSlopes(
       [&](const BlockInfo& info, auto& value) {
         ReadBlock(info, message, prefix, &value, violations);
       },
@@ -270,7 +264,7 @@ void ReadCamera(const v1::CameraCalibration& message,
                 const std::string& prefix,
                 CameraCalibration* camera,
                 Violations* violations) {
-  ReadSensor(kCameraBlocks, message, prefix, camera, violations);
+  ReadSensor(message, prefix, camera, violations);
   camera->width_px = message.width_px();
   camera->height_px = message.height_px();
   ReadDistortion(message, prefix, camera, violations);
@@ -280,13 +274,16 @@ void ReadCamera(const v1::CameraCalibration& message,
 
 v1::CalibrationParameters ToProto(const Calibration& theta) {
   v1::CalibrationParameters message;
-  FillSensor(kImuBlocks, theta.imu, message.mutable_imu());
+  FillSensor(theta.imu, message.mutable_imu());
   for (const CameraCalibration& camera : theta.cameras) {
     v1::CameraCalibration* added = message.add_cameras();
-    FillSensor(kCameraBlocks, camera, added);
+    FillSensor(camera, added);
     added->set_distortion_model(ToProto(camera.model));
     added->set_width_px(camera.width_px);
     added->set_height_px(camera.height_px);
+  }
+  if (HasSlopes(theta)) {
+    message.set_reference_temperature_c(theta.reference_temperature_c);
   }
   return message;
 }
@@ -297,8 +294,7 @@ Violations FromProto(const v1::CalibrationParameters& message,
   Violations violations;
   Calibration read;
   if (message.has_imu()) {
-    ReadSensor(
-        kImuBlocks, message.imu(), prefix + "imu.", &read.imu, &violations);
+    ReadSensor(message.imu(), prefix + "imu.", &read.imu, &violations);
   } else {
     Require(false, prefix + "imu", &violations);
   }
@@ -308,6 +304,9 @@ Violations FromProto(const v1::CalibrationParameters& message,
                prefix + "cameras[" + std::to_string(i) + "].",
                &read.cameras[i],
                &violations);
+  }
+  if (message.has_reference_temperature_c()) {
+    read.reference_temperature_c = message.reference_temperature_c();
   }
   if (violations.empty()) *theta = std::move(read);
   return violations;

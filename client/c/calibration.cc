@@ -251,6 +251,31 @@ selfcal_calibration* selfcal_calibration_copy(
       [&] { return new selfcal_calibration(*calibration); });
 }
 
+int32_t selfcal_calibration_at_temperature(
+    const selfcal_calibration* calibration,
+    double temperature_c,
+    selfcal_calibration** at,
+    selfcal_error* error) {
+  if (at != nullptr) *at = nullptr;
+  return Guarded(error, [&] {
+    auto status =
+        selfcal::c::CheckAllNotNull({{calibration, "calibration"}, {at, "at"}});
+    if (!status.ok()) return status;
+    const selfcal::client::CalibrationVersion version =
+        AtTemperature(calibration->published->version, temperature_c);
+    const auto violations = Validate(version.theta, "calibration");
+    if (!violations.empty()) {
+      return absl::InvalidArgumentError(
+          fmt::format("temperature_c: at {} deg C {} {}",
+                      temperature_c,
+                      violations.front().field,
+                      violations.front().message));
+    }
+    *at = new selfcal_calibration{selfcal::c::Publish(version)};
+    return status;
+  });
+}
+
 void selfcal_calibration_destroy(selfcal_calibration* calibration) {
   delete calibration;
 }

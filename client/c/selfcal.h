@@ -505,6 +505,15 @@ int32_t selfcal_calibration_create(const selfcal_imu* imu,
 // given; NULL for NULL, or if there is no memory.
 selfcal_calibration* selfcal_calibration_copy(
     const selfcal_calibration* calibration);
+// The calibration at a temperature [degrees Celsius]: without slopes, and with
+// the covariance of the values there. One without slopes is the same at every
+// temperature. SELFCAL_INVALID_ARGUMENT: so far from the temperatures of its
+// segments, the values would be impossible.
+int32_t selfcal_calibration_at_temperature(
+    const selfcal_calibration* calibration,
+    double temperature_c,
+    selfcal_calibration** at,
+    selfcal_error* error);
 // NULL is ignored.
 void selfcal_calibration_destroy(selfcal_calibration* calibration);
 
@@ -518,7 +527,9 @@ int32_t selfcal_calibration_component_count(
     const selfcal_calibration* calibration);
 
 // The following fill *imu, *camera or *component, whose struct_size is set by
-// the caller. SELFCAL_OUT_OF_RANGE: there is no such camera or component.
+// the caller. The values of a calibration with slopes are those at its
+// reference temperature; the slopes are among its components.
+// SELFCAL_OUT_OF_RANGE: there is no such camera or component.
 int32_t selfcal_calibration_get_imu(const selfcal_calibration* calibration,
                                     selfcal_imu* imu,
                                     selfcal_error* error);

@@ -148,6 +148,16 @@ class Calibration {
     return selfcal_calibration_camera_count(handle_.get());
   }
 
+  // At a temperature [degrees Celsius] (selfcal_calibration_at_temperature).
+  Calibration AtTemperature(double temperature_c) const {
+    selfcal_calibration* at = nullptr;
+    selfcal_error error;
+    internal::Check(selfcal_calibration_at_temperature(
+                        handle_.get(), temperature_c, &at, &error),
+                    error);
+    return Calibration(at);
+  }
+
   selfcal_imu imu() const {
     auto imu = internal::Sized<selfcal_imu>();
     selfcal_error error;

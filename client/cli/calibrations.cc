@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "client/cli/calibration_report.h"
@@ -10,6 +11,7 @@
 #include "client/cli/instruction.h"
 #include "client/cli/list_options.h"
 #include "client/cli/positive_number.h"
+#include "client/cli/temperature_option.h"
 #include "client/text/estimate_text.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
@@ -87,10 +89,12 @@ int ListCalibrations(Context* context,
 
 int ShowCalibration(Context* context,
                     const std::string& rig,
-                    const std::string& version) {
+                    const std::string& version,
+                    std::optional<double> temperature_c) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::GetCalibrationRequest request;
   request.set_name(ChildName(rig, "calibrations", version));
+  if (temperature_c) request.set_temperature_c(*temperature_c);
   v1::Calibration calibration;
   const auto status = Call<CalibrationService>(
       stub.get(), &CalibrationService::GetCalibration, request, &calibration);
@@ -217,9 +221,11 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   show->add_option("RIG", *rig)->required();
   show->add_option("VERSION", *version, "A number, or active")
       ->capture_default_str();
-  show->callback([context, rig, version] {
-    context->command = [context, rig, version] {
-      return ShowCalibration(context, *rig, *version);
+  const auto temperature_c = std::make_shared<std::optional<double>>();
+  AddTemperature(show, "Temperature of the values", temperature_c.get());
+  show->callback([context, rig, version, temperature_c] {
+    context->command = [context, rig, version, temperature_c] {
+      return ShowCalibration(context, *rig, *version, *temperature_c);
     };
   });
 

@@ -70,13 +70,15 @@ grpc::Status ReadDevice(Context* context,
 grpc::Status ReadDeviceVersion(Context* context,
                                const std::string& rig,
                                const std::string& version,
-                               DeviceVersion* found) {
+                               DeviceVersion* found,
+                               std::optional<double> temperature_c) {
   grpc::Status status = ReadDevice(context, rig, &found->rig_message);
   if (!status.ok()) return status;
   using Service = v1::CalibrationService::StubInterface;
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::GetCalibrationRequest request;
   request.set_name(ChildName(rig, "calibrations", version));
+  if (temperature_c) request.set_temperature_c(*temperature_c);
   status = Call<Service>(
       stub.get(), &Service::GetCalibration, request, &found->message);
   if (!status.ok()) return status;

@@ -31,12 +31,13 @@ struct DeviceVersion {
   Calibration theta;
 };
 
-// Reads a rig and a version of it, a number or "active". DATA_LOSS if the
-// daemon's answer is not valid.
+// Reads a rig and a version of it, a number or "active", at a temperature
+// [deg C] if one is given. DATA_LOSS if the daemon's answer is not valid.
 grpc::Status ReadDeviceVersion(Context* context,
                                const std::string& rig,
                                const std::string& version,
-                               DeviceVersion* found);
+                               DeviceVersion* found,
+                               std::optional<double> temperature_c = {});
 
 // Reads the newest segment that meets the filter, without its data; it has no
 // name if there is none.

@@ -8,6 +8,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/device_data.h"
 #include "client/cli/foreign_files.h"
+#include "client/cli/temperature_option.h"
 
 namespace selfcal::client {
 namespace {
@@ -18,6 +19,7 @@ struct ExportInput {
   std::string format;
   std::string output;
   std::optional<double> imu_rate_hz;
+  std::optional<double> temperature_c;
   bool strict = false;
   bool force = false;
 };
@@ -42,8 +44,8 @@ google::protobuf::Struct FilesMessage(const std::vector<std::string>& paths,
 
 int ExportCalibration(Context* context, const ExportInput& input) {
   DeviceVersion source;
-  const grpc::Status read =
-      ReadDeviceVersion(context, input.rig, input.version, &source);
+  const grpc::Status read = ReadDeviceVersion(
+      context, input.rig, input.version, &source, input.temperature_c);
   if (!read.ok()) return Fail(*context, read);
   const auto exported = ExportRig(input.format,
                                   source.rig,
@@ -95,6 +97,7 @@ void AddCalibrationExport(CLI::App* calibrations, Context* context) {
   command->add_option("--imu-rate",
                       input->imu_rate_hz,
                       "Rate of the IMU, for tools that need it [Hz]");
+  AddTemperature(command, "Temperature of the values", &input->temperature_c);
   command->add_flag("--strict",
                     input->strict,
                     "Write nothing if the predictions of the tool would differ "

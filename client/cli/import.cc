@@ -17,6 +17,7 @@
 #include "client/cli/error_lines.h"
 #include "client/cli/progress.h"
 #include "client/cli/recording_input.h"
+#include "client/cli/temperature_option.h"
 #include "client/selfcal/client.h"
 #include "client/text/text.h"
 #include "core/preflight/diagnose.h"
@@ -254,13 +255,9 @@ CLI::App* AddImport(CLI::App* parent,
                    builder.calibration_version,
                    "The version with which the map was estimated")
       ->capture_default_str();
-  command
-      ->add_option("--temperature",
-                   options->temperature_c,
-                   "Temperature of the device during the recording [degrees "
-                   "Celsius]")
-      ->check(CLI::Range(SegmentLimits{}.min_temperature_c,
-                         SegmentLimits{}.max_temperature_c));
+  AddTemperature(command,
+                 "Temperature of the device during the recording",
+                 &options->temperature_c);
   command
       ->add_option("--timeout",
                    options->timeout_s,

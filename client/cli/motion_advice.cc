@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
@@ -20,13 +22,27 @@ std::string PercentText(double part) {
                       : fmt::format("{:.0f} %", percent);
 }
 
-// The directions whose lesson this motion is; "" for those without one.
+using Missing = v1::AdviseMotionResponse::MissingDirection;
+
+// Whether segments of other temperatures would teach a direction.
+bool IsOfTemperature(const Missing& missing) {
+  const auto& parts = missing.parts();
+  return std::any_of(parts.begin(), parts.end(), [](const auto& part) {
+    return part.component().find("_slope") != std::string::npos;
+  });
+}
+
+// The directions whose lesson this motion is; "" for those without one, which
+// are `of_temperature` or not.
 std::string DirectionLines(const v1::AdviseMotionResponse& response,
-                           const std::string& motion) {
+                           const std::string& motion,
+                           bool of_temperature = false) {
   std::string text;
   int count = 0;
   for (const auto& missing : response.missing()) {
-    if (missing.motion() != motion || ++count > kShown) continue;
+    if (missing.motion() != motion) continue;
+    if (motion.empty() && IsOfTemperature(missing) != of_temperature) continue;
+    if (++count > kShown) continue;
     text += fmt::format(
         "    {}: {}", missing.words(), PercentText(missing.sigma_by_prior()));
     if (!motion.empty()) {
@@ -84,6 +100,14 @@ std::string MissingText(const v1::AdviseMotionResponse& response) {
                         lesson.seconds(),
                         lesson.instruction());
     text += DirectionLines(response, lesson.motion());
+  }
+  const std::string slopes = DirectionLines(response, "", true);
+  if (!slopes.empty()) {
+    text +=
+        "  segments of other temperatures teach this: record some that are 20 "
+        "K "
+        "or more apart:\n";
+    text += slopes;
   }
   if (const std::string rest = DirectionLines(response, ""); !rest.empty()) {
     text += "  no motion teaches this: hold it fixed, or state it better:\n";

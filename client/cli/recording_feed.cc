@@ -63,7 +63,8 @@ class Feed {
     }
     OdometryOptions odometry{.session = options_.session,
                              .keyframe_rate_hz = options_.keyframe_rate_hz,
-                             .keyframes = options_.keyframes};
+                             .keyframes = options_.keyframes,
+                             .temperature_c = options_.temperature_c};
     if (const auto name = ParseSegmentName(last.name())) {
       counts_->continued = true;
       // Not joined to the segment before: its motion is not known here.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "client/cli/context.h"
@@ -13,8 +14,9 @@ namespace selfcal::client {
 struct FeedOptions {
   std::string rig;
   std::string session;
-  int keyframes = 40;            // of a segment
-  double keyframe_rate_hz = 10;  // at most
+  int keyframes = 40;                                  // of a segment
+  double keyframe_rate_hz = 10;                        // at most
+  std::optional<double> temperature_c = std::nullopt;  // of the device
 };
 
 struct FeedCounts {

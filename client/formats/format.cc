@@ -12,6 +12,7 @@
 #include "client/formats/openvins.h"
 #include "client/formats/orb_slam3.h"
 #include "client/formats/vins_fusion.h"
+#include "core/model/temperature.h"
 
 namespace selfcal::client {
 namespace {
@@ -124,8 +125,20 @@ absl::StatusOr<ExportedFiles> ExportRig(const std::string& format,
         fmt::format("{} {}", faults[0].field, faults[0].message));
   }
   try {
-    ExportedFiles result =
-        (*found)->write(rig, WithPositiveFov(theta), options);
+    const double reference_c = theta.reference_temperature_c;
+    ExportedFiles result = (*found)->write(
+        rig, WithPositiveFov(AtTemperature(theta, reference_c)), options);
+    if (HasSlopes(theta)) {
+      result.losses.push_back(
+          {"slopes",
+           fmt::format(
+               "{} has no slopes with temperature: the values are those "
+               "at {} deg C; export those of your temperature with "
+               "--temperature",
+               format,
+               reference_c),
+           true});
+    }
     result.losses.push_back(
         {"sigmas",
          fmt::format("{} has no uncertainty: `selfcal calibration show` has it",

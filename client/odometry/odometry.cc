@@ -12,6 +12,7 @@
 
 #include "client/tracking/feature_tracker.h"
 #include "core/model/median.h"
+#include "core/model/temperature.h"
 #include "core/motion/estimate_motion.h"
 
 namespace selfcal::client {
@@ -44,6 +45,12 @@ struct Keyframe {
   std::vector<TrackPoint> points;
 };
 
+// theta at the temperature of the recording.
+Calibration Seen(const Calibration& theta, const OdometryOptions& options) {
+  return AtTemperature(
+      theta, options.temperature_c.value_or(theta.reference_temperature_c));
+}
+
 }  // namespace
 
 class Odometry::Impl {
@@ -57,7 +64,8 @@ class Odometry::Impl {
         options_(options),
         sets_(ImageSets(*recording)),
         step_(KeyframeStep(sets_, options.keyframe_rate_hz)),
-        tracker_(theta, {.session_start_ns = SessionStart(sets_)}),
+        tracker_(Seen(theta, options),
+                 {.session_start_ns = SessionStart(sets_)}),
         index_(options.first_index) {
     if (options.after_ns) {
       next_set_ = static_cast<std::size_t>(
@@ -259,6 +267,7 @@ class Odometry::Impl {
     MotionSegment segment;
     segment.key = {options_.session, index_};
     segment.session_start_ns = SessionStart(sets_);
+    segment.temperature_c = options_.temperature_c;
     segment.imu = Readings(keyframes.front().t_ns, next_ns);
     std::map<std::uint64_t, int> seen;
     for (const Keyframe& keyframe : keyframes) {
@@ -290,7 +299,7 @@ class Odometry::Impl {
                 const MotionSegment& tracks,
                 OdometrySegment* result) {
     const KeyframeState first = CarryOn(rig_,
-                                        theta,
+                                        Seen(theta, options_),
                                         before_->keyframes.back(),
                                         before_->imu,
                                         tracks.keyframes.front().t_ns);

@@ -40,6 +40,8 @@ struct OdometryOptions {
   // Landmarks with fewer keyframes in a segment are left out of it.
   int min_observations = 3;
   double max_gap_s = 0.6;  // between keyframes of one segment
+  // Of the device [deg C], if it is known: that of all segments.
+  std::optional<double> temperature_c = std::nullopt;
 };
 
 struct OdometrySegment {

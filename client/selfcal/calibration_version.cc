@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/model/temperature.h"
 #include "proto/convert.h"
 
 namespace selfcal::client {
@@ -15,6 +16,18 @@ absl::Status Broken(const Violation& violation) {
 }
 
 }  // namespace
+
+CalibrationVersion AtTemperature(const CalibrationVersion& version,
+                                 double temperature_c) {
+  CalibrationVersion at = version;
+  at.theta = selfcal::AtTemperature(version.theta, temperature_c);
+  if (version.covariance.size() > 0) {
+    const Eigen::MatrixXd by_theta =
+        TemperatureDerivative(version.theta, temperature_c);
+    at.covariance = by_theta * version.covariance * by_theta.transpose();
+  }
+  return at;
+}
 
 absl::StatusOr<CalibrationVersion> ToCalibrationVersion(
     const v1::Calibration& message) {

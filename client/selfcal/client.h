@@ -147,6 +147,12 @@ struct CalibrationVersion {
   Eigen::MatrixXd covariance;
 };
 
+// A version at a temperature [deg C]: without slopes, with the covariance of
+// the values there. It is the version itself if it has no slopes, whose values
+// do not vary with temperature.
+CalibrationVersion AtTemperature(const CalibrationVersion& version,
+                                 double temperature_c);
+
 // Watches the active calibration of a rig. Calls back with the active version
 // at once, and with each version that becomes active later. Reconnects when the
 // daemon restarts, and waits for a rig that does not exist yet. A slow callback

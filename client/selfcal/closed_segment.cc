@@ -8,6 +8,7 @@
 #include "client/selfcal/track_positions.h"
 #include "core/calibration/problem.h"
 #include "core/factor/state_time.h"
+#include "core/model/temperature.h"
 
 namespace selfcal::client {
 namespace {
@@ -166,8 +167,13 @@ class Landmarks {
 
 // The states at the timestamps of their images.
 std::vector<KeyframeState> StatesAtImages(const ClosedSegment& closed) {
-  const ImuCalibration imu =
-      closed.theta == nullptr ? ImuCalibration{} : closed.theta->imu;
+  ImuCalibration imu;
+  if (closed.theta != nullptr) {
+    const double reference_c = closed.theta->reference_temperature_c;
+    imu =
+        AtTemperature(*closed.theta, closed.temperature_c.value_or(reference_c))
+            .imu;
+  }
   std::vector<KeyframeState> states;
   states.reserve(closed.keyframes.size());
   for (const ObservedKeyframe& keyframe : closed.keyframes) {

@@ -9,6 +9,7 @@
 #include "core/factor/keyframe_motion.h"
 #include "core/model/median.h"
 #include "core/model/rig.h"
+#include "core/model/temperature.h"
 
 namespace selfcal::client {
 namespace {
@@ -53,15 +54,17 @@ std::vector<std::optional<Eigen::Vector3d>> TriangulateTracks(
     double gravity_mps2) {
   Rig rig;
   rig.gravity_mps2 = gravity_mps2;
+  const SegmentTheta theta_s(theta, segment);
   KeyframeMotions motions;
   if (!segment.imu.empty()) {
     motions.Measure(rig,
-                    theta,
+                    *theta_s,
                     std::vector<char>(theta.cameras.size(), 0),
                     segment.keyframes,
                     [&](std::size_t k) { return ContextOf(segment, k); });
   }
-  const LandmarkScene scene(theta, segment.keyframes, motions, pixel_sigma_px);
+  const LandmarkScene scene(
+      *theta_s, segment.keyframes, motions, pixel_sigma_px);
   std::vector<std::optional<Eigen::Vector3d>> positions;
   positions.reserve(tracks.size());
   for (const Track& track : tracks) {

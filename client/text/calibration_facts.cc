@@ -222,6 +222,15 @@ std::vector<Fact> CalibrationFacts(const v1::Calibration& calibration) {
   Add(&facts, "version", fmt::format("{}", calibration.version()));
   Add(&facts, "state", StateText(calibration.state()));
   AddVerdict(calibration, &facts);
+  if (calibration.has_temperature_c()) {
+    Add(&facts,
+        "values at",
+        fmt::format("{:.1f} C{}",
+                    calibration.temperature_c(),
+                    calibration.parameters().has_reference_temperature_c()
+                        ? ", the reference; elsewhere by the slopes"
+                        : ""));
+  }
   Add(&facts, "created", TimeText(calibration.create_time()));
   for (const std::string& reason : calibration.reasons()) {
     Add(&facts, "rejected because", reason);

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <deque>
 #include <memory>
+#include <utility>
 
+#include "core/calibration/chain_thetas.h"
 #include "core/factor/ceres_factors.h"
 #include "core/model/symmetric_eigen.h"
 
@@ -75,6 +77,7 @@ class Builder {
           const CalibrationEstimate& estimate,
           const std::vector<ScreenedLandmark>& landmarks)
       : round_(round),
+        thetas_(round.reference, round.problem),
         d_(estimate.d),
         rotation_(MakeRotationManifold()),
         gauge_(MakeGaugeRotationManifold()),
@@ -166,22 +169,25 @@ class Builder {
       KeyframeBlocks& a = keyframes_[links[i].before];
       KeyframeBlocks& b = keyframes_[links[i].after];
       const auto& states = round_.problem.keyframes;
-      problem_.AddResidualBlock(MakeInertialCost(round_.reference,
-                                                 links[i].samples,
-                                                 states[links[i].before].t_ns,
-                                                 states[links[i].after].t_ns,
-                                                 round_.rig.imu_noise,
-                                                 round_.rig.gravity_mps2,
-                                                 round_.whitening[i])
-                                    .release(),
-                                nullptr,
-                                d_.data(),
-                                a.q.data(),
-                                a.p.data(),
-                                a.vb.data(),
-                                b.q.data(),
-                                b.p.data(),
-                                b.vb.data());
+      const int chain = thetas_.IndexOf(links[i].before);
+      problem_.AddResidualBlock(
+          ByTheta(chain,
+                  MakeInertialCost(thetas_[chain],
+                                   links[i].samples,
+                                   states[links[i].before].t_ns,
+                                   states[links[i].after].t_ns,
+                                   round_.rig.imu_noise,
+                                   round_.rig.gravity_mps2,
+                                   round_.whitening[i]))
+              .release(),
+          nullptr,
+          d_.data(),
+          a.q.data(),
+          a.p.data(),
+          a.vb.data(),
+          b.q.data(),
+          b.p.data(),
+          b.vb.data());
     }
     for (const BiasLink& link : round_.problem.bias_links) {
       problem_.AddResidualBlock(MakeBiasWalkCost(link.sigmas).release(),
@@ -205,13 +211,16 @@ class Builder {
       for (const UsedObservation& used : landmarks[i].used) {
         const TrackObservation& seen = track.observations[used.index];
         losses_.emplace_back(round_.loss, landmarks[i].weight * used.weight);
+        const int chain = thetas_.IndexOf(seen.keyframe);
         problem_.AddResidualBlock(
-            MakeReprojectionCost(round_.reference,
-                                 seen.camera,
-                                 seen.z_px,
-                                 round_.rig.pixel_sigma_px,
-                                 landmarks[i].position.anchor,
-                                 round_.motions.At(seen.keyframe, seen.camera))
+            ByTheta(chain,
+                    MakeReprojectionCost(
+                        thetas_[chain],
+                        seen.camera,
+                        seen.z_px,
+                        round_.rig.pixel_sigma_px,
+                        landmarks[i].position.anchor,
+                        round_.motions.At(seen.keyframe, seen.camera)))
                 .release(),
             &losses_.back(),
             d_.data(),
@@ -222,7 +231,17 @@ class Builder {
     }
   }
 
+  // Turns a factor about the theta of a chain into one about theta.
+  std::unique_ptr<ceres::CostFunction> ByTheta(
+      int chain, std::unique_ptr<ceres::CostFunction> cost) const {
+    if (thetas_.Derivative(chain) == nullptr) return cost;
+    return MakeTemperatureCost(round_.reference,
+                               round_.problem.chain_temperatures_c[chain],
+                               std::move(cost));
+  }
+
   const SolverRound& round_;
+  const ChainThetas thetas_;  // at the reference
   Eigen::VectorXd d_;
   std::vector<KeyframeBlocks> keyframes_;
   std::vector<Eigen::Vector3d> positions_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/model/camera.h"
 
@@ -82,16 +83,16 @@ Eigen::Vector3d StepWithDepth(const Eigen::Matrix3d& H,
 
 }  // namespace
 
-LandmarkScene::LandmarkScene(const Calibration& theta,
+LandmarkScene::LandmarkScene(ChainThetas thetas,
                              std::span<const KeyframeState> keyframes,
                              const KeyframeMotions& motions,
                              double pixel_sigma_px)
-    : theta_(theta),
+    : thetas_(std::move(thetas)),
       keyframes_(keyframes),
       motions_(motions),
       pixel_sigma_px_(pixel_sigma_px) {
-  poses_.reserve(keyframes.size() * theta.cameras.size());
-  const int cameras = static_cast<int>(theta.cameras.size());
+  const int cameras = static_cast<int>(thetas_[0].cameras.size());
+  poses_.reserve(keyframes.size() * cameras);
   for (int k = 0; k < static_cast<int>(keyframes.size()); ++k) {
     for (int j = 0; j < cameras; ++j) {
       poses_.push_back(ExposedAt(k, j, Eigen::Vector2d::Zero()));
@@ -102,7 +103,7 @@ LandmarkScene::LandmarkScene(const Calibration& theta,
 CameraPose LandmarkScene::ExposedAt(int keyframe,
                                     int camera,
                                     const Eigen::Vector2d& z_px) const {
-  const CameraCalibration& c = theta_.cameras[camera];
+  const CameraCalibration& c = thetas_.OfKeyframe(keyframe).cameras[camera];
   Eigen::Quaterniond q_GI = keyframes_[keyframe].q_GI;
   Eigen::Vector3d p_GI = keyframes_[keyframe].p_GI;
   if (const KeyframeMotion* motion = motions_.At(keyframe, camera)) {

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/calibration/chain_thetas.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/robust_loss.h"
 #include "core/factor/keyframe_motion.h"
@@ -44,22 +45,22 @@ struct CameraPose {
 // The poses of every camera at every keyframe.
 class LandmarkScene {
  public:
-  // All but pixel_sigma_px must outlive the scene.
-  LandmarkScene(const Calibration& theta,
+  // Keyframes and motions must outlive the scene.
+  LandmarkScene(ChainThetas thetas,
                 std::span<const KeyframeState> keyframes,
                 const KeyframeMotions& motions,
                 double pixel_sigma_px);
 
   double pixel_sigma_px() const { return pixel_sigma_px_; }
   const CameraCalibration& camera(const TrackObservation& seen) const {
-    return theta_.cameras[seen.camera];
+    return thetas_.OfKeyframe(seen.keyframe).cameras[seen.camera];
   }
   // The camera of an observation when its pixel was exposed.
   CameraPose PoseOf(const TrackObservation& seen) const {
     const bool rolling = camera(seen).line_delay_s.has_value();
-    return rolling
-               ? ExposedAt(seen.keyframe, seen.camera, seen.z_px)
-               : poses_[seen.keyframe * theta_.cameras.size() + seen.camera];
+    return rolling ? ExposedAt(seen.keyframe, seen.camera, seen.z_px)
+                   : poses_[seen.keyframe * thetas_[0].cameras.size() +
+                            seen.camera];
   }
 
   // Predicted minus measured [px] of a homogeneous point in G; by_p_C, unless
@@ -76,7 +77,7 @@ class LandmarkScene {
                        int camera,
                        const Eigen::Vector2d& z_px) const;
 
-  const Calibration& theta_;
+  ChainThetas thetas_;
   std::span<const KeyframeState> keyframes_;
   const KeyframeMotions& motions_;
   double pixel_sigma_px_;

@@ -50,6 +50,7 @@ std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem) {
 
 // Empty chains; returns the chain of each keyframe.
 std::vector<int> StartChains(const CalibrationProblem& problem,
+                             const ChainThetas& thetas,
                              EliminationPlan* plan) {
   const std::vector<KeyframeChain> ranges = FindChains(problem);
   plan->chains.resize(ranges.size());
@@ -57,6 +58,7 @@ std::vector<int> StartChains(const CalibrationProblem& problem,
   for (std::size_t c = 0; c < ranges.size(); ++c) {
     ChainPlan& chain = plan->chains[c];
     chain.range = ranges[c];
+    chain.theta = thetas.IndexOf(ranges[c].begin);
     chain.landmarks.clear();
     chain.tracks.assign(1, 0);
     chain.track_keyframes.clear();
@@ -155,7 +157,8 @@ void PlanWalks(const LinearPoint& point,
 void PlanElimination(const LinearPoint& point,
                      LinearObservations* observations,
                      EliminationPlan* plan) {
-  const std::vector<int> chain_of_keyframe = StartChains(point.problem, plan);
+  const std::vector<int> chain_of_keyframe =
+      StartChains(point.problem, point.thetas, plan);
   plan->interface_size = 0;
   plan->walk_squares = 0;
   PlanTracks(chain_of_keyframe, observations, plan);

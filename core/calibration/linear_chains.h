@@ -26,6 +26,7 @@ struct HalfWalk {
 
 struct ChainPlan {
   KeyframeChain range;
+  int theta = 0;  // its theta_s, an index into ChainThetas
   // A piece of the track of a landmark is a landmark of the chain: its index
   // in the problem, its keyframes as ChainShape has them, and the first of its
   // kept unknowns, or -1.

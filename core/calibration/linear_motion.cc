@@ -62,22 +62,33 @@ ChainStateMatrix GaugePrior(const KeyframeState& x) {
 void LinearMotion::Linearise(const LinearPoint& point,
                              std::span<const InertialNoiseRoot> roots) {
   const std::vector<InertialLink>& links = point.problem.inertial_links;
-  states_.clear();
   link_after_.assign(point.keyframes.size(), -1);
-  for (std::size_t i = 0; i < links.size(); ++i) {
-    states_.push_back({&point.keyframes[links[i].before],
-                       &point.keyframes[links[i].after],
-                       links[i].samples});
-    link_after_[links[i].before] = static_cast<int>(i);
+  places_.resize(links.size());
+  transitions_.resize(point.thetas.size());
+  for (int t = 0; t < point.thetas.size(); ++t) {
+    states_.clear();
+    roots_.clear();
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      if (point.thetas.IndexOf(links[i].before) != t) continue;
+      places_[i] = {t, static_cast<int>(states_.size())};
+      states_.push_back({&point.keyframes[links[i].before],
+                         &point.keyframes[links[i].after],
+                         links[i].samples});
+      roots_.push_back(roots[i]);
+      link_after_[links[i].before] = static_cast<int>(i);
+    }
+    inertial_.LineariseWithRoots(states_,
+                                 point.thetas[t].imu,
+                                 point.rig.gravity_mps2,
+                                 roots_,
+                                 &transitions_[t]);
   }
-  inertial_.LineariseWithRoots(
-      states_, point.theta.imu, point.rig.gravity_mps2, roots, &transitions_);
 }
 
 double LinearMotion::Squares() const {
   double squares = 0;
-  for (std::size_t i = 0; i < transitions_.size(); ++i) {
-    const std::span whitened(transitions_[i].whitened, kChainStateSize);
+  for (int i = 0; i < links(); ++i) {
+    const std::span whitened(transition(i).whitened, kChainStateSize);
     for (const double r : whitened) squares += r * r;
   }
   return squares;

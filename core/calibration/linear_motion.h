@@ -21,18 +21,29 @@ class LinearMotion {
   void Linearise(const LinearPoint& point,
                  std::span<const InertialNoiseRoot> roots);
 
-  int links() const { return static_cast<int>(transitions_.size()); }
+  int links() const { return static_cast<int>(places_.size()); }
   int keyframes() const { return static_cast<int>(link_after_.size()); }
   // Index of the link between a keyframe and the next, which must exist.
   int LinkAfter(int keyframe) const { return link_after_[keyframe]; }
-  InertialTransition transition(int link) const { return transitions_[link]; }
+  InertialTransition transition(int link) const {
+    const Place& place = places_[link];
+    return transitions_[place.theta][place.index];
+  }
   // Sum of all squared whitened residuals.
   double Squares() const;
 
  private:
+  // A link, by its theta_s and its index among the links with the same.
+  struct Place {
+    int theta;
+    int index;
+  };
+
   InertialBatch inertial_;
   std::vector<InertialLinkStates> states_;
-  InertialTransitions transitions_;
+  std::vector<InertialNoiseRoot> roots_;
+  std::vector<Place> places_;                     // by link
+  std::vector<InertialTransitions> transitions_;  // by theta
   std::vector<int> link_after_;
 };
 

@@ -40,7 +40,7 @@ void LinearObservations::SortByView(int views) {
 }
 
 void LinearObservations::Collect(const LinearPoint& point) {
-  cameras_ = static_cast<int>(point.theta.cameras.size());
+  cameras_ = static_cast<int>(point.thetas[0].cameras.size());
   PlaceLandmarks(point);
   all_.clear();
   landmark_begin_.assign(1, 0);

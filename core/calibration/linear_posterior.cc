@@ -17,7 +17,19 @@ Eigen::MatrixXd Select(const Eigen::MatrixXd& covariance,
   return covariance(indices, indices);
 }
 
-// Step and covariance of the shared unknowns of a chain, theta's `head` first.
+// Covariance of (theta_s, others) from that of (theta, others).
+Eigen::MatrixXd AtTemperature(const Eigen::MatrixXd& derivative,
+                              const Eigen::MatrixXd& covariance) {
+  const Eigen::Index others = covariance.rows() - derivative.cols();
+  Eigen::MatrixXd whole =
+      Eigen::MatrixXd::Zero(derivative.rows() + others, covariance.rows());
+  whole.topLeftCorner(derivative.rows(), derivative.cols()) = derivative;
+  whole.bottomRightCorner(others, others).setIdentity();
+  return whole * covariance * whole.transpose();
+}
+
+// Step and covariance of the shared unknowns of a chain, the `head` of theta_s
+// first.
 struct SharedPosterior {
   Eigen::Index head = 0;
   Eigen::VectorXd step;
@@ -99,12 +111,13 @@ LinearPosterior LinearSystem::FindPosterior(
   ChainPosterior of_chain;
   for (std::size_t c = 0; c < chains_.size(); ++c) {
     const ChainPlan& plan = plan_.chains[c];
-    SharedPosterior shared{
-        .head = D,
-        .step = Eigen::VectorXd(
-            D + static_cast<Eigen::Index>(plan.interface.size())),
-        .covariance = Select(covariance, D, plan.interface)};
-    shared.step << theta_step, interface(plan.interface);
+    SharedPosterior shared{.head = D,
+                           .step = SharedStep(plan, theta_step, interface),
+                           .covariance = Select(covariance, D, plan.interface)};
+    if (const Eigen::MatrixXd* derivative = DerivativeOf(plan)) {
+      shared.head = derivative->rows();
+      shared.covariance = AtTemperature(*derivative, shared.covariance);
+    }
     chains_[c].FindSteps(shared.step, &states, &points);
     chains_[c].FindPosterior(shared.step, shared.covariance, states, &of_chain);
     for (int k = plan.range.begin; k < plan.range.end; ++k) {

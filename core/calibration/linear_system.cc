@@ -1,5 +1,7 @@
 #include "core/calibration/linear_system.h"
 
+#include "core/elimination/by_theta.h"
+
 namespace selfcal {
 
 void LinearSystem::ReleaseChains() {
@@ -11,11 +13,12 @@ void LinearSystem::EliminateChain(const LinearPoint& point,
                                   const ChainPlan& plan,
                                   ChainElimination* elimination,
                                   SharedInformation* result) {
+  const Calibration& theta = point.thetas.OfKeyframe(plan.range.begin);
   std::vector<LandmarkRows> cameras;
-  for (const CameraCalibration& camera : point.theta.cameras) {
+  for (const CameraCalibration& camera : theta.cameras) {
     cameras.push_back(RowsOf(camera));
   }
-  elimination->Start(plan.Shape(ImuTangentSize(point.theta.imu), cameras),
+  elimination->Start(plan.Shape(ImuTangentSize(theta.imu), cameras),
                      ChainElimination::Record::kSteps);
   const KeyframeChain& range = plan.range;
   for (int k = range.begin; k < range.end; ++k) {
@@ -42,6 +45,26 @@ void LinearSystem::EliminateChain(const LinearPoint& point,
   }
   add_half(plan.walk_out);
   elimination->Finish(result);
+  if (const Eigen::MatrixXd* derivative = DerivativeOf(plan)) {
+    *result = ByTheta(*derivative, *result);
+  }
+}
+
+const Eigen::MatrixXd* LinearSystem::DerivativeOf(const ChainPlan& plan) const {
+  return derivatives_.empty() ? nullptr : &derivatives_[plan.theta];
+}
+
+Eigen::VectorXd LinearSystem::SharedStep(
+    const ChainPlan& plan,
+    const Eigen::VectorXd& theta_step,
+    const Eigen::VectorXd& interface_step) const {
+  const Eigen::MatrixXd* derivative = DerivativeOf(plan);
+  const Eigen::VectorXd chain_step =
+      derivative != nullptr ? *derivative * theta_step : theta_step;
+  Eigen::VectorXd shared(chain_step.size() +
+                         static_cast<Eigen::Index>(plan.interface.size()));
+  shared << chain_step, interface_step(plan.interface);
+  return shared;
 }
 
 void LinearSystem::Linearise(const LinearPoint& point,
@@ -54,10 +77,17 @@ void LinearSystem::Linearise(const LinearPoint& point,
   motion_.Linearise(point, roots);
   priors_.Set(point, damping);
 
-  const int size = TangentSize(point.theta);
+  derivatives_.clear();
+  for (int t = 0; t < point.thetas.size(); ++t) {
+    if (const Eigen::MatrixXd* by_theta = point.thetas.Derivative(t)) {
+      derivatives_.push_back(*by_theta);
+    }
+  }
+  const Eigen::Index size = derivatives_.empty() ? TangentSize(point.thetas[0])
+                                                 : derivatives_.front().cols();
   information_.Lambda.setZero(size, size);
   information_.eta.setZero(size);
-  interface_.Start(plan_.interface_size, size);
+  interface_.Start(plan_.interface_size, static_cast<int>(size));
   decrease_ = motion_.Squares();
 
   const std::size_t chains = plan_.chains.size();
@@ -89,15 +119,12 @@ void LinearSystem::FindSteps(const Eigen::VectorXd& theta_step,
   keyframes->clear();
   landmarks->assign(observations_.landmarks(), Eigen::Vector3d::Zero());
   const Eigen::VectorXd interface = interface_.Step(theta_step);
-  Eigen::VectorXd shared;
   std::vector<ChainStateVector> of_chain;
   std::vector<Eigen::Vector3d> points;
   for (std::size_t c = 0; c < chains_.size(); ++c) {
     const ChainPlan& plan = plan_.chains[c];
-    const auto kept = static_cast<Eigen::Index>(plan.interface.size());
-    shared.resize(theta_step.size() + kept);
-    shared << theta_step, interface(plan.interface);
-    chains_[c].FindSteps(shared, &of_chain, &points);
+    chains_[c].FindSteps(
+        SharedStep(plan, theta_step, interface), &of_chain, &points);
     keyframes->insert(keyframes->end(), of_chain.begin(), of_chain.end());
     for (std::size_t m = 0; m < plan.landmarks.size(); ++m) {
       const int landmark = plan.landmarks[m];

@@ -99,6 +99,12 @@ class LinearSystem {
                       const ChainPlan& plan,
                       ChainElimination* elimination,
                       SharedInformation* result);
+  // Derivative of the theta_s of a chain by theta; null: the identity.
+  const Eigen::MatrixXd* DerivativeOf(const ChainPlan& plan) const;
+  // Step of the unknowns that a chain shares with others.
+  Eigen::VectorXd SharedStep(const ChainPlan& plan,
+                             const Eigen::VectorXd& theta_step,
+                             const Eigen::VectorXd& interface_step) const;
 
   VectorWidth width_;
   LinearObservations observations_;
@@ -106,6 +112,8 @@ class LinearSystem {
   LinearMotion motion_;
   KeyframePriors priors_;
   EliminationPlan plan_;
+  // Derivatives of theta_s by theta; empty: the identity.
+  std::vector<Eigen::MatrixXd> derivatives_;
   std::vector<ChainElimination> chains_;  // of the plan
   LinearInterface interface_;
   SharedInformation information_;

@@ -31,7 +31,7 @@ ObservationRun LinearViews::Gather(const LinearPoint& point,
   const int keyframe = view / observations.cameras();
   const int camera = view % observations.cameras();
   return {&point.keyframes[keyframe],
-          &point.theta.cameras[camera],
+          &point.thetas.OfKeyframe(keyframe).cameras[camera],
           static_cast<int>(gathered_.size()),
           landmarks_.data(),
           z_px_.data(),

@@ -58,7 +58,7 @@ double Consistency(const RobustLoss& loss, double variance) {
 
 std::vector<NoiseProblem::LinkNoise> NoiseProblem::SplitInertialNoise(
     const SolverRound& round,
-    const ImuCalibration& imu,
+    const ChainThetas& thetas,
     const std::vector<KeyframeState>& keyframes) {
   std::array<ImuNoise, kNoiseKinds> alone;
   for (const NoiseKind kind : kInertialKinds) {
@@ -75,7 +75,7 @@ std::vector<NoiseProblem::LinkNoise> NoiseProblem::SplitInertialNoise(
       EvaluateInertial(link.samples,
                        keyframes[link.before],
                        keyframes[link.after],
-                       imu,
+                       thetas.OfKeyframe(link.before).imu,
                        noise,
                        round.rig.gravity_mps2,
                        nullptr,
@@ -101,7 +101,9 @@ NoiseProblem::NoiseProblem(const SolverRound& round,
       estimate_(estimate),
       track_noise_(track_noise),
       inertial_(SplitInertialNoise(
-          round, BoxPlus(round.reference, estimate.d).imu, estimate.keyframes)),
+          round,
+          ChainThetas(BoxPlus(round.reference, estimate.d), round.problem),
+          estimate.keyframes)),
       landmarks_(SplitIntoPieces(round.problem, landmarks)),
       rig_(round.rig),
       problem_(round.problem),

@@ -13,6 +13,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/calibration/chain_thetas.h"
 #include "core/calibration/noise_scale.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/robust_loss.h"
@@ -60,7 +61,7 @@ class NoiseProblem {
 
   static std::vector<LinkNoise> SplitInertialNoise(
       const SolverRound& round,
-      const ImuCalibration& imu,
+      const ChainThetas& thetas,
       const std::vector<KeyframeState>& keyframes);
   void ScaleLandmarks(double pixel_factor);
   void ScaleInertial(const NoiseVector& factors);

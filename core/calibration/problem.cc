@@ -6,10 +6,12 @@
 #include <tuple>
 #include <utility>
 
+#include "core/calibration/chain_thetas.h"
 #include "core/calibration/map_sharing.h"
 #include "core/calibration/track_depth.h"
 #include "core/factor/inertial.h"
 #include "core/factor/sampling.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -62,6 +64,24 @@ PartitionTracks CollectTracks(const std::vector<const MotionSegment*>& segments,
     result.landmarks_G.push_back(places_G[id]);
   }
   return result;
+}
+
+// The mean over the segments of each chain.
+std::vector<double> ChainTemperatures(
+    const Calibration& theta,
+    const std::vector<const MotionSegment*>& segments,
+    const std::vector<bool>& starts_chain) {
+  std::vector<double> means_c;
+  int count = 0;
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    if (starts_chain[s]) {
+      means_c.push_back(0);
+      count = 0;
+    }
+    double& mean_c = means_c.back();
+    mean_c += (TemperatureOf(theta, *segments[s]) - mean_c) / ++count;
+  }
+  return means_c;
 }
 
 // The chains that begin with segments of a partition.
@@ -146,6 +166,8 @@ CalibrationProblem FlattenSegments(
       problem.chain_starts.push_back(first_keyframe[s]);
     }
   }
+  problem.chain_temperatures_c =
+      ChainTemperatures(rig.factory, segments, starts_chain);
   for (const std::vector<int>& partition : partitioning.partitions) {
     PartitionTracks all = CollectTracks(segments, partition, first_keyframe);
     const std::vector<bool> with_depth =
@@ -172,10 +194,15 @@ void MeasureMotions(const Rig& rig,
                     const CalibrationProblem& problem,
                     std::span<const KeyframeState> keyframes,
                     KeyframeMotions* motions) {
+  const ChainThetas thetas(theta, problem);
   motions->Measure(
-      rig, theta, EstimatedTimeOffsets(rig), keyframes, [&](std::size_t k) {
-        return problem.contexts[k];
-      });
+      rig,
+      [&](std::size_t k) -> const Calibration& {
+        return thetas.OfKeyframe(static_cast<int>(k));
+      },
+      EstimatedTimeOffsets(rig),
+      keyframes,
+      [&](std::size_t k) { return problem.contexts[k]; });
 }
 
 }  // namespace selfcal

@@ -61,6 +61,8 @@ struct CalibrationProblem {
   std::vector<int> gauge_keyframes;
   // First keyframe of each chain of inertial links.
   std::vector<int> chain_starts;
+  // Temperature of each chain [deg C]: the mean of its segments.
+  std::vector<double> chain_temperatures_c;
   std::vector<InertialLink> inertial_links;
   std::vector<BiasLink> bias_links;
   std::vector<Track> tracks;  // by (partition, id, time)

@@ -23,7 +23,8 @@ struct Selected {
   int candidates = 0;  // all but those at the border
 };
 
-// Weights of observations by their predicted positions.
+// Weights of observations by their predicted positions. The last rays are those
+// at the reference temperature.
 class BorderWeights {
  public:
   BorderWeights(const Calibration& theta, double pixel_sigma_px)
@@ -273,7 +274,8 @@ Screening ScreenLandmarks(const Rig& rig,
                           const KeyframeMotions& motions,
                           const CalibrateOptions& options,
                           const Screening* before) {
-  const LandmarkScene scene(theta, keyframes, motions, rig.pixel_sigma_px);
+  const LandmarkScene scene(
+      ChainThetas(theta, problem), keyframes, motions, rig.pixel_sigma_px);
   std::vector<TrackPositions> positions(problem.tracks.size());
   const int screenings = before != nullptr ? before->screenings + 1 : 1;
   const bool settle = screenings > kFreeScreenings;
@@ -315,7 +317,8 @@ void RefineOnWhatIsUsed(const Rig& rig,
                         const std::vector<KeyframeState>& keyframes,
                         const KeyframeMotions& motions,
                         Screening* screening) {
-  const LandmarkScene scene(theta, keyframes, motions, rig.pixel_sigma_px);
+  const LandmarkScene scene(
+      ChainThetas(theta, problem), keyframes, motions, rig.pixel_sigma_px);
   for (ScreenedLandmark& landmark : screening->landmarks) {
     const Track& track = problem.tracks[landmark.track];
     if (!InFull(landmark.used, track)) {
@@ -332,7 +335,8 @@ ReprojectionStatistics MeasureReprojection(
     const std::vector<KeyframeState>& keyframes,
     const KeyframeMotions& motions,
     const std::vector<ScreenedLandmark>& landmarks) {
-  const LandmarkScene scene(theta, keyframes, motions, rig.pixel_sigma_px);
+  const LandmarkScene scene(
+      ChainThetas(theta, problem), keyframes, motions, rig.pixel_sigma_px);
   std::vector<double> projected_px;
   double sum_of_squares = 0;
   int used = 0;

@@ -102,8 +102,8 @@ MotionSegment SettleSegment(const Rig& rig,
                                 i == 0 ? nullptr : &screening);
     RefineOnWhatIsUsed(
         rig, theta, problem, estimate.keyframes, motions, &screening);
-    const std::vector<InertialMatrix> whitening =
-        WhitenInertialLinks(rig, theta.imu, problem, estimate.keyframes);
+    const std::vector<InertialMatrix> whitening = WhitenInertialLinks(
+        rig, ChainThetas(theta, problem), problem, estimate.keyframes);
     const SolverRound round = {.rig = rig,
                                .reference = theta,
                                .problem = problem,

@@ -97,18 +97,25 @@ std::vector<InertialNoiseRoot> RootsOf(const SolverRound& round) {
 
 double MotionSquares(const SolverRound& round,
                      std::span<const InertialNoiseRoot> roots,
-                     const Calibration& theta,
+                     const ChainThetas& thetas,
                      const std::vector<KeyframeState>& keyframes) {
-  std::vector<InertialLinkStates> links;
-  for (const InertialLink& link : round.problem.inertial_links) {
-    links.push_back(
-        {&keyframes[link.before], &keyframes[link.after], link.samples});
-  }
-  std::vector<InertialResidual> residuals(links.size());
-  InertialBatch(WidestVectors())
-      .Residuals(links, theta.imu, round.rig.gravity_mps2, roots, residuals);
   double sum = 0;
-  for (const InertialResidual& r : residuals) sum += r.squaredNorm();
+  for (int t = 0; t < thetas.size(); ++t) {
+    std::vector<InertialLinkStates> links;
+    std::vector<InertialNoiseRoot> of_links;
+    for (std::size_t i = 0; i < roots.size(); ++i) {
+      const InertialLink& link = round.problem.inertial_links[i];
+      if (thetas.IndexOf(link.before) != t) continue;
+      links.push_back(
+          {&keyframes[link.before], &keyframes[link.after], link.samples});
+      of_links.push_back(roots[i]);
+    }
+    std::vector<InertialResidual> residuals(links.size());
+    InertialBatch(WidestVectors())
+        .Residuals(
+            links, thetas[t].imu, round.rig.gravity_mps2, of_links, residuals);
+    for (const InertialResidual& r : residuals) sum += r.squaredNorm();
+  }
   for (const BiasLink& link : round.problem.bias_links) {
     const KeyframeState& a = keyframes[link.before];
     const KeyframeState& b = keyframes[link.after];
@@ -125,13 +132,15 @@ double Evaluate(const SolverRound& round,
                 const std::vector<ScreenedLandmark>& landmarks,
                 const RefineLimits& limits,
                 std::vector<LandmarkPosition>* positions) {
-  const Calibration theta = BoxPlus(round.reference, estimate.d);
-  double sum = MotionSquares(round, roots, theta, estimate.keyframes);
+  ChainThetas thetas(BoxPlus(round.reference, estimate.d), round.problem);
+  double sum = MotionSquares(round, roots, thetas, estimate.keyframes);
   if (round.prior_information != nullptr) {
     sum += estimate.d.dot(*round.prior_information * estimate.d);
   }
-  const LandmarkScene scene(
-      theta, estimate.keyframes, round.motions, round.rig.pixel_sigma_px);
+  const LandmarkScene scene(std::move(thetas),
+                            estimate.keyframes,
+                            round.motions,
+                            round.rig.pixel_sigma_px);
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     sum += landmarks[i].weight *
            RefinePosition(scene,
@@ -171,11 +180,11 @@ bool LineariseFactors(const SolverRound& round,
                       const RobustLoss* loss,
                       LinearisedRound* result,
                       double damping) {
-  const Calibration theta = BoxPlus(round.reference, estimate.d);
+  const ChainThetas thetas(BoxPlus(round.reference, estimate.d), round.problem);
   result->theta_by_offset = ThetaByOffset(round.reference, estimate.d);
   result->roots = RootsOf(round);
   result->system.Linearise({round.rig,
-                            theta,
+                            thetas,
                             round.problem,
                             estimate.keyframes,
                             round.motions,

@@ -4,7 +4,7 @@ namespace selfcal {
 
 std::vector<InertialMatrix> WhitenInertialLinks(
     const Rig& rig,
-    const ImuCalibration& imu,
+    const ChainThetas& thetas,
     const CalibrationProblem& problem,
     const std::vector<KeyframeState>& keyframes) {
   std::vector<InertialMatrix> whitening;
@@ -14,7 +14,7 @@ std::vector<InertialMatrix> WhitenInertialLinks(
     EvaluateInertial(link.samples,
                      keyframes[link.before],
                      keyframes[link.after],
-                     imu,
+                     thetas.OfKeyframe(link.before).imu,
                      rig.imu_noise,
                      rig.gravity_mps2,
                      nullptr,

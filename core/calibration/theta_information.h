@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "core/calibration/chain_thetas.h"
 #include "core/calibration/problem.h"
 #include "core/elimination/chain_elimination.h"
 #include "core/factor/inertial.h"
@@ -18,7 +19,7 @@ namespace selfcal {
 // estimate. It is constant within one round while the estimate moves.
 std::vector<InertialMatrix> WhitenInertialLinks(
     const Rig& rig,
-    const ImuCalibration& imu,
+    const ChainThetas& thetas,
     const CalibrationProblem& problem,
     const std::vector<KeyframeState>& keyframes);
 

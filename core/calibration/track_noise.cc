@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "core/calibration/chain_thetas.h"
 #include "core/calibration/landmark_position.h"
 #include "core/factor/reprojection.h"
 
@@ -71,9 +72,16 @@ class TrackSummer {
               const CalibrationEstimate& estimate,
               const Directions& directions)
       : round_(round),
-        theta_(BoxPlus(round.reference, estimate.d)),
+        thetas_(BoxPlus(round.reference, estimate.d), round.problem),
         keyframes_(estimate.keyframes),
-        directions_(directions) {}
+        directions_(directions) {
+    for (int t = 0; t < thetas_.size(); ++t) {
+      const Eigen::MatrixXd* derivative = thetas_.Derivative(t);
+      chain_directions_.push_back(derivative != nullptr
+                                      ? *derivative * directions.theta
+                                      : directions.theta);
+    }
+  }
 
   TrackSums Sum(const ScreenedLandmark& landmark) const {
     const Eigen::Index D = directions_.theta.cols();
@@ -125,11 +133,12 @@ class TrackSummer {
   std::optional<Row> RowOf(const TrackObservation& seen,
                            const Eigen::Vector4d& point_G) const {
     const KeyframeState& x = keyframes_[seen.keyframe];
+    const Calibration& theta = thetas_.OfKeyframe(seen.keyframe);
     ReprojectionJacobians jacobians;
     Row row;
     if (!Reproject(x.q_GI,
                    x.p_GI,
-                   theta_.cameras[seen.camera],
+                   theta.cameras[seen.camera],
                    point_G,
                    seen.z_px,
                    &row.r,
@@ -140,18 +149,21 @@ class TrackSummer {
     const double scale = 1 / round_.rig.pixel_sigma_px;
     row.r *= scale;
     row.by_point = scale * jacobians.landmark;
-    row.along = scale * (jacobians.camera *
-                             directions_.theta.middleRows(
-                                 CameraTangentOffset(theta_, seen.camera),
-                                 jacobians.camera.cols()) +
-                         jacobians.pose * directions_.poses[seen.keyframe]);
+    row.along =
+        scale *
+        (jacobians.camera *
+             chain_directions_[thetas_.IndexOf(seen.keyframe)].middleRows(
+                 CameraTangentOffset(theta, seen.camera),
+                 jacobians.camera.cols()) +
+         jacobians.pose * directions_.poses[seen.keyframe]);
     return row;
   }
 
   const SolverRound& round_;
-  const Calibration theta_;
+  const ChainThetas thetas_;
   const std::vector<KeyframeState>& keyframes_;
   const Directions& directions_;
+  std::vector<Eigen::MatrixXd> chain_directions_;  // of the theta, by thetas_
 };
 
 }  // namespace

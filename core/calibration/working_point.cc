@@ -79,7 +79,8 @@ void WorkingPoint::SelectFrom(const Screening* before) {
   RefineOnWhatIsUsed(
       rig_, at, problem_, estimate_.keyframes, motions_, &screening_);
   SetTrackNoise(track_noise_factor_, &screening_);
-  whitening_ = WhitenInertialLinks(rig_, at.imu, problem_, estimate_.keyframes);
+  whitening_ = WhitenInertialLinks(
+      rig_, ChainThetas(at, problem_), problem_, estimate_.keyframes);
 }
 
 bool WorkingPoint::Linearise() { return LineariseBy(&screening_.loss); }

@@ -34,9 +34,9 @@ std::string ComponentInWords(std::string_view component) {
       component.substr(std::min(dot + 1, component.size()));
   std::string words;
   if (sensor == "imu") {
-    words = Words(kImuBlocks, rest);
+    words = Words(kImuBlocks, rest) + Words(kImuSlopes, rest);
   } else if (sensor.starts_with("cam")) {
-    words = Words(kCameraBlocks, rest);
+    words = Words(kCameraBlocks, rest) + Words(kCameraSlopes, rest);
     if (!words.empty()) {
       words += fmt::format(" of camera {}", sensor.substr(3));
     }

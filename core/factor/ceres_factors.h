@@ -56,6 +56,14 @@ std::unique_ptr<ceres::CostFunction> MakeInertialCost(
 std::unique_ptr<ceres::CostFunction> MakeBiasWalkCost(
     const Eigen::Matrix<double, 6, 1>& sigmas);
 
+// The same factor at a temperature (core/model/temperature.h). `cost` has
+// blocks (theta, ...) about AtTemperature(theta_reference, temperature_c), the
+// result has them about theta_reference.
+std::unique_ptr<ceres::CostFunction> MakeTemperatureCost(
+    const Calibration& theta_reference,
+    double temperature_c,
+    std::unique_ptr<ceres::CostFunction> cost);
+
 // One block x of the size of `mean`; residual = square_root (x - mean).
 std::unique_ptr<ceres::CostFunction> MakePriorCost(
     const Eigen::MatrixXd& square_root, const Eigen::VectorXd& mean);

@@ -126,17 +126,21 @@ class KeyframeMotions {
   }
 
   // `estimated` is nonzero for each camera whose offset is estimated;
-  // context(k) is that of keyframe k.
-  template <typename Context>
+  // theta_of(k) is theta_s of keyframe k (temperature.h), and context(k) its
+  // context.
+  template <typename ThetaOf, typename Context>
   void Measure(const Rig& rig,
-               const Calibration& theta,
+               const ThetaOf& theta_of,
                std::span<const char> estimated,
                std::span<const KeyframeState> keyframes,
                const Context& context) {
-    FindCameras(theta, estimated);
+    index_.clear();
+    if (keyframes.empty()) return;
+    FindCameras(theta_of(0), estimated);
     if (index_.empty()) return;
     motions_.resize(keyframes.size() * stride_);
     for (std::size_t k = 0; k < keyframes.size(); ++k) {
+      const Calibration& theta = theta_of(k);
       for (std::size_t j = 0; j < index_.size(); ++j) {
         if (index_[j] < 0) continue;
         motions_[k * stride_ + index_[j]] = MeasureMotion(context(k),
@@ -149,6 +153,17 @@ class KeyframeMotions {
     }
   }
 
+  // One theta for all keyframes.
+  template <typename Context>
+  void Measure(const Rig& rig,
+               const Calibration& theta,
+               std::span<const char> estimated,
+               std::span<const KeyframeState> keyframes,
+               const Context& context) {
+    const auto same = [&](std::size_t) -> const Calibration& { return theta; };
+    Measure(rig, same, estimated, keyframes, context);
+  }
+
  private:
   void FindCameras(const Calibration& theta, std::span<const char> estimated);
 
@@ -157,6 +172,7 @@ class KeyframeMotions {
   std::vector<KeyframeMotion> motions_;
 };
 
+// `theta` is theta_s of the segment (temperature.h).
 KeyframeMotions SegmentMotions(const Rig& rig,
                                const Calibration& theta,
                                const MotionSegment& segment);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/elimination/small_cholesky.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -240,12 +241,13 @@ InlierSelection SelectInliers(const Rig& rig,
                               const Calibration& theta0,
                               const MotionSegment& segment,
                               const ScoreOptions& options) {
+  const SegmentTheta theta_s(theta0, segment);
   ObservationOrder order;
   order.Find(segment, static_cast<int>(theta0.cameras.size()));
-  return InlierSelector().Select(theta0,
+  return InlierSelector().Select(*theta_s,
                                  rig.pixel_sigma_px,
                                  segment,
-                                 SegmentMotions(rig, theta0, segment),
+                                 SegmentMotions(rig, *theta_s, segment),
                                  order,
                                  options);
 }

@@ -46,8 +46,8 @@ class InlierSelector {
   explicit InlierSelector(VectorWidth width = WidestVectors())
       : kernels_(width) {}
 
-  // `motions` and `order` are those of the segment. The result is valid until
-  // the next call.
+  // `motions` and `order` are those of the segment, and theta0 is its theta_s
+  // (temperature.h). The result is valid until the next call.
   const InlierSelection& Select(const Calibration& theta0,
                                 double pixel_sigma_px,
                                 const MotionSegment& segment,
@@ -82,7 +82,7 @@ class InlierSelector {
   std::vector<double> squares_, new_squares_, sorted_;
 };
 
-// Selects the inliers of one segment.
+// Selects the inliers of one segment, with theta0 at its temperature.
 InlierSelection SelectInliers(const Rig& rig,
                               const Calibration& theta0,
                               const MotionSegment& segment,

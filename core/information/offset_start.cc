@@ -9,6 +9,7 @@
 
 #include "core/factor/state_time.h"
 #include "core/information/inliers.h"
+#include "core/model/temperature.h"
 #include "core/preflight/time_offset.h"
 
 namespace selfcal {
@@ -51,13 +52,14 @@ std::optional<OffsetStart> FindOffsetStart(const Rig& rig,
   if (std::count(estimated.begin(), estimated.end(), 0) > 0) {
     return std::nullopt;
   }
-  const auto found = EstimateTimeOffset(theta, std::span(&segment, 1));
+  const SegmentTheta theta_s(theta, segment);
+  const auto found = EstimateTimeOffset(*theta_s, std::span(&segment, 1));
   if (!found || std::abs(found->offset_s) <=
                     std::max(kFarTimeOffset_s, kSigmas * found->sigma_s)) {
     return std::nullopt;
   }
   OffsetStart start{theta, 0, segment};
-  MoveToStamps(rig, theta.imu, found->offset_s, &start.segment);
+  MoveToStamps(rig, theta_s->imu, found->offset_s, &start.segment);
   Calibration later = Later(theta, found->offset_s);
   if (MedianResidual(rig, later, start.segment) <
       MedianResidual(rig, theta, start.segment)) {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 
+#include "core/elimination/by_theta.h"
 #include "core/information/inliers.h"
 #include "core/information/linearisation.h"
 #include "core/information/observation_order.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -31,27 +33,37 @@ SegmentEnds SummariseEnds(const Rig& rig,
                           const Calibration& theta0,
                           const MotionSegment& segment,
                           const ScoreOptions& options) {
+  const SegmentTheta theta_s(theta0, segment);
   ObservationOrder order;
   order.Find(segment, static_cast<int>(theta0.cameras.size()));
-  const KeyframeMotions motions = SegmentMotions(rig, theta0, segment);
+  const KeyframeMotions motions = SegmentMotions(rig, *theta_s, segment);
   InlierSelector selector;
   SegmentLineariser lineariser;
-  const SharedInformation& information =
+  SharedInformation information =
       lineariser
-          .EliminateToEnds(
-              rig,
-              theta0,
-              segment,
-              motions,
-              selector.Select(
-                  theta0, rig.pixel_sigma_px, segment, motions, order, options),
-              order)
+          .EliminateToEnds(rig,
+                           *theta_s,
+                           segment,
+                           motions,
+                           selector.Select(*theta_s,
+                                           rig.pixel_sigma_px,
+                                           segment,
+                                           motions,
+                                           order,
+                                           options),
+                           order)
           .theta;
+  const double temperature_c = TemperatureOf(theta0, segment);
+  if (theta_s.varies()) {
+    information =
+        ByTheta(TemperatureDerivative(theta0, temperature_c), information);
+  }
   std::vector<int> used = FreeComponents(rig);
   const auto size = static_cast<int>(information.eta.size());
   for (int i = TangentSize(theta0); i < size; ++i) used.push_back(i);
   SegmentEnds ends{.key = segment.key,
                    .theta0 = theta0,
+                   .temperature_c = temperature_c,
                    .first = segment.keyframes.front(),
                    .last = segment.keyframes.back(),
                    .Lambda = Eigen::MatrixXd::Zero(size, size),

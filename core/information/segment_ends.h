@@ -30,6 +30,7 @@ struct SegmentEnds {
   SegmentKey key;
   // Linearisation point.
   Calibration theta0;
+  double temperature_c = 0;  // of the segment
   KeyframeState first, last;
   // Information about D + kEndUnknowns: theta [-] theta0, then the offsets of
   // both states. It is that of the data alone; rows of components that the rig

@@ -6,6 +6,7 @@
 #include "core/factor/reprojection.h"
 #include "core/information/inliers.h"
 #include "core/information/observation_order.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -75,15 +76,16 @@ SegmentResiduals EvaluateResiduals(const Rig& rig,
                                    const Calibration& theta,
                                    const MotionSegment& segment,
                                    const ScoreOptions& options) {
-  const KeyframeMotions motions = SegmentMotions(rig, theta, segment);
+  const SegmentTheta theta_s(theta, segment);
+  const KeyframeMotions motions = SegmentMotions(rig, *theta_s, segment);
   ObservationOrder order;
   order.Find(segment, static_cast<int>(theta.cameras.size()));
   InlierSelector selector;
   const InlierSelection& selected = selector.Select(
-      theta, rig.pixel_sigma_px, segment, motions, order, options);
+      *theta_s, rig.pixel_sigma_px, segment, motions, order, options);
   SegmentResiduals residuals;
-  residuals.observations = Reprojections(theta, segment, motions, selected);
-  residuals.intervals = Intervals(rig, theta, segment);
+  residuals.observations = Reprojections(*theta_s, segment, motions, selected);
+  residuals.intervals = Intervals(rig, *theta_s, segment);
   residuals.statistics = selected.statistics;
   residuals.statistics.inertial_rms = RootMeanSquares(residuals.intervals);
   return residuals;

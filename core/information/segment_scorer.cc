@@ -4,9 +4,11 @@
 #include <cmath>
 #include <optional>
 
+#include "core/elimination/by_theta.h"
 #include "core/factor/sampling.h"
 #include "core/information/offset_start.h"
 #include "core/model/symmetric_eigen.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -109,16 +111,25 @@ void SegmentScorer::ScoreAt(const Rig& rig,
                             const MotionSegment& segment,
                             const ScoreOptions& options,
                             SegmentInformation* result) {
+  const SegmentTheta theta_s(theta0, segment);
   order_.Find(segment, static_cast<int>(theta0.cameras.size()));
   motions_.Measure(rig,
-                   theta0,
+                   *theta_s,
                    components_.estimated_time_offsets(),
                    segment.keyframes,
                    [&](std::size_t k) { return ContextOf(segment, k); });
   const InlierSelection& selection = selector_.Select(
-      theta0, rig.pixel_sigma_px, segment, motions_, order_, options);
+      *theta_s, rig.pixel_sigma_px, segment, motions_, order_, options);
   const LinearisedSegment& linearised =
-      Eliminate(rig, theta0, segment, selection, options.gauge_keyframe);
+      Eliminate(rig, *theta_s, segment, selection, options.gauge_keyframe);
+  SharedInformation by_theta;
+  if (theta_s.varies()) {
+    by_theta =
+        ByTheta(TemperatureDerivative(theta0, TemperatureOf(theta0, segment)),
+                linearised.theta);
+  }
+  const SharedInformation& information =
+      theta_s.varies() ? by_theta : linearised.theta;
   result->theta0 = theta0;
   result->residuals = selection.statistics;
   result->residuals.inertial_rms = linearised.inertial_rms;
@@ -135,7 +146,7 @@ void SegmentScorer::ScoreAt(const Rig& rig,
   for (Eigen::Index j = 0; j < size; ++j) {
     for (Eigen::Index i = 0; i < size; ++i) {
       normalised_(i, j) = prior(free[i]) * prior(free[j]) *
-                          linearised.theta.Lambda(free[i], free[j]);
+                          information.Lambda(free[i], free[j]);
     }
   }
   if (!definite_.Factor(normalised_)) {
@@ -146,7 +157,7 @@ void SegmentScorer::ScoreAt(const Rig& rig,
                         &result->rank,
                         &result->unobserved,
                         &observed_);
-  const double discount = MeasureFit(rig, segment, linearised.theta, result);
+  const double discount = MeasureFit(rig, segment, information, result);
   if (discount < 1) {
     normalised_ *= discount;
     group_scorer_.Observe(normalised_,
@@ -164,7 +175,7 @@ void SegmentScorer::ScoreAt(const Rig& rig,
       result->Lambda(free[i], free[j]) =
           normalised_(i, j) / (prior(free[i]) * prior(free[j]));
     }
-    result->eta(free[j]) = discount * linearised.theta.eta(free[j]);
+    result->eta(free[j]) = discount * information.eta(free[j]);
   }
   group_scorer_.Score(components_, normalised_, &result->groups);
 }

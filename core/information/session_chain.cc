@@ -4,6 +4,7 @@
 
 #include "core/factor/inertial.h"
 #include "core/information/linearisation.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -83,26 +84,31 @@ void SessionChain::Add(const SegmentEnds& segment, double weight) {
     if (same_session) AddGap(segment);
   }
   Eliminate(theta_, before + kState);
-  end_ = {segment.key, segment.last, segment.tail};
+  end_ = {segment.key, segment.temperature_c, segment.last, segment.tail};
 }
 
 // The inertial factor from the newest keyframe to the first of the segment.
 void SessionChain::AddLink(const SegmentEnds& segment) {
+  // The temperature of the link is the mean of both segments.
+  const double temperature_c =
+      0.5 * (end_->temperature_c + segment.temperature_c);
   InertialJacobians J;
   InertialMatrix covariance;
-  const InertialResidual residual = EvaluateInertial(end_->tail,
-                                                     end_->state,
-                                                     segment.first,
-                                                     point_.imu,
-                                                     rig_.imu_noise,
-                                                     rig_.gravity_mps2,
-                                                     &J,
-                                                     &covariance);
+  const InertialResidual residual =
+      EvaluateInertial(end_->tail,
+                       end_->state,
+                       segment.first,
+                       AtTemperature(point_, temperature_c).imu,
+                       rig_.imu_noise,
+                       rig_.gravity_mps2,
+                       &J,
+                       &covariance);
   const InertialMatrix W = SquareRootInformation(covariance);
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(kState, eta_.size());
-  for (const int i : FreeComponents(rig_)) {
-    if (i < J.theta.cols()) rows.col(i) = J.theta.col(i);
-  }
+  const Eigen::MatrixXd by_theta =
+      J.theta *
+      TemperatureDerivative(point_, temperature_c).topRows(J.theta.cols());
+  for (const int i : FreeComponents(rig_)) rows.col(i) = by_theta.col(i);
   rows.middleCols<kState>(theta_) = J.x0;
   rows.middleCols<kState>(theta_ + kState) = J.x1;
   rows = W * rows;

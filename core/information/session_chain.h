@@ -42,6 +42,7 @@ class SessionChain {
   // The end of the newest segment.
   struct End {
     SegmentKey key;
+    double temperature_c;
     KeyframeState state;
     std::vector<ImuSample> tail;
   };

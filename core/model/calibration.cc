@@ -7,6 +7,7 @@
 
 #include "core/model/parameter_blocks.h"
 #include "core/model/so3.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -132,7 +133,13 @@ int TimeOffsetComponent(const Calibration& theta, int camera) {
 }
 
 int TangentSize(const Calibration& theta) {
-  return CameraTangentOffset(theta, static_cast<int>(theta.cameras.size()));
+  int size =
+      CameraTangentOffset(theta, static_cast<int>(theta.cameras.size())) +
+      SensorTangentSize(kImuSlopes, theta.imu);
+  for (const CameraCalibration& camera : theta.cameras) {
+    size += SensorTangentSize(kCameraSlopes, camera);
+  }
+  return size;
 }
 
 Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta) {
@@ -179,12 +186,13 @@ bool SameShape(const Calibration& a, const Calibration& b) {
       [&](const BlockInfo&, const auto& value, const auto& other) {
         same = same && TangentDimension(value) == TangentDimension(other);
       };
-  VisitSensorBlocks(kImuBlocks, compare, a.imu, b.imu);
+  VisitWithSlopes(compare, a.imu, b.imu);
   for (std::size_t j = 0; same && j < a.cameras.size(); ++j) {
     if (a.cameras[j].model != b.cameras[j].model) return false;
-    VisitSensorBlocks(kCameraBlocks, compare, a.cameras[j], b.cameras[j]);
+    VisitWithSlopes(compare, a.cameras[j], b.cameras[j]);
   }
-  return same;
+  return same && (a.reference_temperature_c == b.reference_temperature_c ||
+                  !HasSlopes(a));
 }
 
 Eigen::VectorXd ReadableValues(const Calibration& theta) {

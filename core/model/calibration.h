@@ -2,12 +2,13 @@
 // space of named components.
 //
 // Order of the tangent, ImuTangentSize + sum over cameras of (6 + 4 +
-// distortion + 1 to 3) components:
+// distortion + 1 to 3) + slopes components:
 //   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3, and those that it has of
 //   g-sensitivity 9 and position of the accelerometer 3 or 9;
 //   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1,
 //   line delay 1 if its shutter is a rolling one, and time drift 1 if its clock
-//   drifts.
+//   drifts;
+//   slopes with temperature, those that it has: of the imu, of each camera.
 // Rotations are perturbed on the right (so3.h); all other components are
 // additive. Source: Schneider et al., ICRA 2017, sections III-B and III-C; the
 // time offset and all optional parts are extensions.
@@ -44,12 +45,6 @@ inline constexpr int kCameraDistortion = kCameraIntrinsics + 4;
 inline constexpr int kMaxCameraTangentSize =
     kCameraIntrinsics + kMaxIntrinsics + 3;
 
-// The value of an optional block: of size 0 if the sensor lacks it. Stored
-// without allocation.
-inline constexpr int kMaxOptionalSize = 9;
-using OptionalVector =
-    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxOptionalSize, 1>;
-
 // theta_i. At the angular rate w [rad/s] and acceleration dw/dt of the body and
 // the specific force f_I at its origin, axis j of the accelerometer feels, at
 // its position r_j,
@@ -67,6 +62,9 @@ struct ImuCalibration {
   // Positions in I [m]: 3, of all axes, or 9, of the axes x, y, z of A; without
   // it, zero.
   OptionalVector accel_position;
+  // Slopes of the above with temperature (temperature.h), per kelvin: of the
+  // rotation as a rotation vector in I [rad/K]; without values, zero.
+  OptionalVector s_g_slope, m_g_slope, s_a_slope, m_a_slope, q_AI_slope;
 
   // Upper triangular: scales on the diagonal, m = (m_x, m_y, m_z) at (0,1),
   // (0,2), (1,2).
@@ -77,9 +75,14 @@ struct ImuCalibration {
   Eigen::Matrix3d AccelPositions() const;
 };
 
+inline constexpr double kDefaultReferenceTemperature_c = 25;
+
 struct Calibration {
   ImuCalibration imu;
   std::vector<CameraCalibration> cameras;
+  // Temperature [deg C] at which the values hold whose slopes it has; constant,
+  // not estimated.
+  double reference_temperature_c = kDefaultReferenceTemperature_c;
 };
 
 // One component of the tangent. The names and units come from
@@ -96,10 +99,12 @@ struct TangentComponent {
 // Dimension of the tangent of a calibration.
 int TangentSize(const Calibration& theta);
 
-// Dimension of the tangent of the IMU, the first part of that of theta.
+// Dimension of the tangent of the IMU, the first part of that of theta, without
+// its slopes.
 int ImuTangentSize(const ImuCalibration& imu);
 
-// Dimension of the tangent of camera j, and its offset in that of theta.
+// Dimension of the tangent of camera j without its slopes, and its offset in
+// that of theta.
 int CameraTangentSize(const CameraCalibration& camera);
 int CameraTangentOffset(const Calibration& theta, int camera);
 // Whether the clock of any camera drifts (CameraCalibration::time_drift).
@@ -126,8 +131,8 @@ Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b);
 Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
                               const Eigen::VectorXd& d);
 
-// Same number of cameras, each with the same distortion model, and the same
-// optional blocks.
+// Same number of cameras, each with the same distortion model, the same
+// optional blocks, and the same reference temperature if there are slopes.
 bool SameShape(const Calibration& a, const Calibration& b);
 
 // Value of each component for display: the scalar itself, and for a rotation

@@ -98,8 +98,7 @@ std::string Fault(const BlockInfo& info, const Value& value) {
 void CheckImu(const ImuCalibration& imu,
               const std::string& path,
               ViolationList* list) {
-  VisitSensorBlocks(
-      kImuBlocks,
+  VisitWithSlopes(
       [&](const BlockInfo& info, const auto& value) {
         AddIf(path + "." + std::string(info.field), Fault(info, value), list);
       },
@@ -109,8 +108,7 @@ void CheckImu(const ImuCalibration& imu,
 void CheckCamera(const CameraCalibration& camera,
                  const std::string& path,
                  ViolationList* list) {
-  VisitSensorBlocks(
-      kCameraBlocks,
+  VisitWithSlopes(
       [&](const BlockInfo& info, const auto& value) {
         AddIf(path + "." + std::string(info.field),
               info.accepted == Accepted::kCoefficients ? DistortionFault(camera)
@@ -127,11 +125,21 @@ void CheckCamera(const CameraCalibration& camera,
 std::vector<Violation> Validate(const Calibration& theta,
                                 const std::string& prefix) {
   // kMaxCameras cameras cannot produce more violations.
-  ViolationList list(static_cast<int>(std::size(kImuBlocks)) +
-                     static_cast<int>(std::size(kCameraBlocks) + 3) *
-                         kMaxCameras);
+  ViolationList list(
+      static_cast<int>(std::size(kImuBlocks) + std::size(kImuSlopes) + 1) +
+      static_cast<int>(std::size(kCameraBlocks) + std::size(kCameraSlopes) +
+                       3) *
+          kMaxCameras);
   const std::string begin = prefix.empty() ? "" : prefix + ".";
   CheckImu(theta.imu, begin + "imu", &list);
+  const double reference_c = theta.reference_temperature_c;
+  const SegmentLimits limits;
+  if (!(reference_c >= limits.min_temperature_c &&
+        reference_c <= limits.max_temperature_c)) {
+    list.Add(begin + "reference_temperature_c",
+             Readable(reference_c) +
+                 " is not the temperature of a device in degrees Celsius");
+  }
   const std::string cameras = begin + "cameras";
   const std::size_t count = theta.cameras.size();
   if (count == 0) {

@@ -27,6 +27,12 @@ enum class DistortionModel : int {
   kEquidistant,       // k1 k2 k3 k4: Kannala and Brandt, beyond 90 degrees
 };
 
+// The value of an optional block: of size 0 if the sensor lacks it. Stored
+// without allocation.
+inline constexpr int kMaxOptionalSize = 9;
+using OptionalVector =
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxOptionalSize, 1>;
+
 // Room for the coefficients of every model, so that none are allocated.
 inline constexpr int kMaxDistortion = 8;
 inline constexpr int kMaxIntrinsics = 4 + kMaxDistortion;
@@ -61,6 +67,10 @@ struct CameraCalibration {
   // the session begins (MotionSegment), and time_drift more each second later.
   // Without a value, none.
   std::optional<double> time_drift;
+  // Slopes of the above with temperature (temperature.h), per kelvin: of the
+  // rotation as a rotation vector in I [rad/K]; without values, zero.
+  OptionalVector q_CI_slope, p_CI_slope;
+  OptionalVector f_slope, c_slope;
   int width_px = 0;  // of the image; constant, not estimated
   int height_px = 0;
 

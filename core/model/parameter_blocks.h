@@ -49,8 +49,8 @@ struct BlockInfo {
   // a finer image the same errors of the same scene are more pixels. Ignored
   // for a distortion.
   double sigma_ref = 0;
-  // Standard deviation of a value of which a rig states nothing; 0: ten times
-  // sigma_ref.
+  // Standard deviation of a value of which a rig states nothing, in pixels for
+  // the same images; 0: ten times sigma_ref.
   double prior_sigma = 0;
   Accepted accepted = Accepted::kMagnitude;
   double limit = 0;
@@ -235,6 +235,133 @@ inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
      &CameraCalibration::time_drift},
 };
 
+// A block, of an OptionalVector, that is the slope of another one with
+// temperature: its name is that of the other, and kSlopeSuffix.
+inline constexpr std::string_view kSlopeSuffix = "_slope";
+template <class Sensor>
+struct SlopeBlock : Block<Sensor> {
+  std::variant<Eigen::Vector3d Sensor::*,
+               Eigen::Vector2d Sensor::*,
+               Eigen::Quaterniond Sensor::*>
+      of;
+};
+
+// Prior sigmas of the IMU are those of data sheets of low-cost parts (a change
+// of the sensitivity of 0.02 to 0.03 % per kelvin), of a camera those of a
+// plastic lens and mount (1e-4 of the focal length per kelvin). Reference
+// sigmas are those of the blocks, over 20 K.
+inline constexpr SlopeBlock<ImuCalibration> kImuSlopes[] = {
+    {{{.name = "gyro.scale_slope",
+       .field = "s_g_slope",
+       .unit = "1/K",
+       .sigma_ref = 3e-4,
+       .prior_sigma = 3e-4,
+       .limit = 0.1,
+       .words = "the change of the gyroscope's scale with temperature on ",
+       .estimated = false,
+       .sizes = {3}},
+      &ImuCalibration::s_g_slope},
+     &ImuCalibration::s_g},
+    {{{.name = "gyro.misalignment_slope",
+       .field = "m_g_slope",
+       .unit = "1/K",
+       .sigma_ref = 3.5e-4,
+       .prior_sigma = 1e-4,
+       .limit = 0.1,
+       .words = "the change of the gyroscope's misalignment with temperature ",
+       .estimated = false,
+       .sizes = {3}},
+      &ImuCalibration::m_g_slope},
+     &ImuCalibration::m_g},
+    {{{.name = "accel.scale_slope",
+       .field = "s_a_slope",
+       .unit = "1/K",
+       .sigma_ref = 2e-3,
+       .prior_sigma = 3e-4,
+       .limit = 0.1,
+       .words = "the change of the accelerometer's scale with temperature on ",
+       .estimated = false,
+       .sizes = {3}},
+      &ImuCalibration::s_a_slope},
+     &ImuCalibration::s_a},
+    {{{.name = "accel.misalignment_slope",
+       .field = "m_a_slope",
+       .unit = "1/K",
+       .sigma_ref = 2e-3,
+       .prior_sigma = 1e-4,
+       .limit = 0.1,
+       .words =
+           "the change of the accelerometer's misalignment with temperature ",
+       .estimated = false,
+       .sizes = {3}},
+      &ImuCalibration::m_a_slope},
+     &ImuCalibration::m_a},
+    {{{.name = "q_AI_slope",
+       .field = "q_AI_slope",
+       .unit = "rad/K",
+       .sigma_ref = 1.75e-3,
+       .prior_sigma = 1e-4,
+       .limit = 0.1,
+       .words = "the turn of the accelerometer relative to the gyroscope with "
+                "temperature about ",
+       .estimated = false,
+       .sizes = {3}},
+      &ImuCalibration::q_AI_slope},
+     &ImuCalibration::q_AI},
+};
+
+inline constexpr SlopeBlock<CameraCalibration> kCameraSlopes[] = {
+    {{{.name = "q_CI_slope",
+       .field = "q_CI_slope",
+       .unit = "rad/K",
+       .sigma_ref = 2.5e-4,
+       .prior_sigma = 5e-5,
+       .limit = 0.1,
+       .group = "extrinsics",
+       .words = "the turn relative to the IMU with temperature about ",
+       .estimated = false,
+       .sizes = {3}},
+      &CameraCalibration::q_CI_slope},
+     &CameraCalibration::q_CI},
+    {{{.name = "p_CI_slope",
+       .field = "p_CI_slope",
+       .unit = "m/K",
+       .sigma_ref = 6.5e-4,
+       .prior_sigma = 1e-5,
+       .limit = 0.1,
+       .group = "extrinsics",
+       .words = "the change of the distance from the IMU with temperature "
+                "along ",
+       .estimated = false,
+       .sizes = {3}},
+      &CameraCalibration::p_CI_slope},
+     &CameraCalibration::p_CI},
+    {{{.name = "focal_slope",
+       .field = "f_slope",
+       .unit = "px/K",
+       .sigma_ref = 0.075,
+       .prior_sigma = 0.05,
+       .limit = 1e3,
+       .group = "camera",
+       .words = "the change of the focal length with temperature in ",
+       .estimated = false,
+       .sizes = {2}},
+      &CameraCalibration::f_slope},
+     &CameraCalibration::f},
+    {{{.name = "principal_slope",
+       .field = "c_slope",
+       .unit = "px/K",
+       .sigma_ref = 0.075,
+       .prior_sigma = 0.05,
+       .limit = 1e3,
+       .group = "camera",
+       .words = "the change of the principal point with temperature in ",
+       .estimated = false,
+       .sizes = {2}},
+      &CameraCalibration::c_slope},
+     &CameraCalibration::c},
+};
+
 template <class Value>
 int TangentDimension(const Value& value) {
   if constexpr (std::is_same_v<Value, double>) {
@@ -330,6 +457,18 @@ void VisitSensorBlocks(const Blocks& blocks,
   }
 }
 
+// The same for all blocks of an IMU or of a camera, and the slopes of those.
+template <class Visitor, class Sensor, class... Sensors>
+void VisitWithSlopes(const Visitor& visit, Sensor& sensor, Sensors&... others) {
+  if constexpr (std::is_same_v<std::remove_const_t<Sensor>, ImuCalibration>) {
+    VisitSensorBlocks(kImuBlocks, visit, sensor, others...);
+    VisitSensorBlocks(kImuSlopes, visit, sensor, others...);
+  } else {
+    VisitSensorBlocks(kCameraBlocks, visit, sensor, others...);
+    VisitSensorBlocks(kCameraSlopes, visit, sensor, others...);
+  }
+}
+
 // Calls visit(place, value, values...) for each block that theta has, with its
 // values in theta and in others of the same shape.
 template <class Visitor, class Theta, class... Thetas>
@@ -342,12 +481,17 @@ void VisitBlocks(const Visitor& visit, Theta& theta, Thetas&... others) {
         visit(BlockPlace{info, offset, camera}, value, values...);
         offset += TangentDimension(value);
       };
-  VisitSensorBlocks(kImuBlocks, visit_block, theta.imu, others.imu...);
-  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
-    camera = static_cast<int>(j);
-    VisitSensorBlocks(
-        kCameraBlocks, visit_block, theta.cameras[j], others.cameras[j]...);
-  }
+  const auto visit_all = [&](const auto& of_imu, const auto& of_cameras) {
+    camera = -1;
+    VisitSensorBlocks(of_imu, visit_block, theta.imu, others.imu...);
+    for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+      camera = static_cast<int>(j);
+      VisitSensorBlocks(
+          of_cameras, visit_block, theta.cameras[j], others.cameras[j]...);
+    }
+  };
+  visit_all(kImuBlocks, kCameraBlocks);
+  visit_all(kImuSlopes, kCameraSlopes);
 }
 
 // The name of the block of each component, in the order of the tangent.

@@ -65,15 +65,20 @@ std::vector<int> HeldComponents(
 bool IsDeclaredEstimated(std::string_view block) {
   const std::size_t dot = block.find('.');
   const std::string_view name = block.substr(dot + 1);
-  const auto has_name = [&](const auto& one) { return one.info.name == name; };
+  bool estimated = false;
+  const auto find_in = [&](const auto& blocks) {
+    for (const auto& one : blocks) {
+      if (one.info.name == name) estimated = one.info.estimated;
+    }
+  };
   if (block.substr(0, dot) == "imu") {
-    const auto* const found =
-        std::find_if(std::begin(kImuBlocks), std::end(kImuBlocks), has_name);
-    return found != std::end(kImuBlocks) && found->info.estimated;
+    find_in(kImuBlocks);
+    find_in(kImuSlopes);
+  } else {
+    find_in(kCameraBlocks);
+    find_in(kCameraSlopes);
   }
-  const auto* const found = std::find_if(
-      std::begin(kCameraBlocks), std::end(kCameraBlocks), has_name);
-  return found != std::end(kCameraBlocks) && found->info.estimated;
+  return estimated;
 }
 
 // The setting of a block, or null.
@@ -116,8 +121,8 @@ std::vector<ParameterGroup> DefaultGroups(
         }
       },
       theta);
-  for (const auto& block : kCameraBlocks) {
-    if (!estimated.contains(block.info.name)) continue;
+  const auto add = [&](const Block<CameraCalibration>& block) {
+    if (!estimated.contains(block.info.name)) return;
     const auto has_name = [&](const ParameterGroup& group) {
       return group.name == block.info.group;
     };
@@ -126,7 +131,9 @@ std::vector<ParameterGroup> DefaultGroups(
       group = groups.insert(group, {std::string(block.info.group), {}});
     }
     group->patterns.push_back(Pattern("*", block));
-  }
+  };
+  for (const auto& block : kCameraBlocks) add(block);
+  for (const auto& block : kCameraSlopes) add(block);
   std::erase_if(groups, [](const ParameterGroup& group) {
     return group.patterns.empty();
   });
@@ -148,10 +155,9 @@ void AddEstimatedBlocks(const std::vector<BlockSetting>& blocks,
       }
     };
   };
-  VisitSensorBlocks(kImuBlocks, add_to("imu"), theta->imu);
+  VisitWithSlopes(add_to("imu"), theta->imu);
   for (std::size_t j = 0; j < theta->cameras.size(); ++j) {
-    VisitSensorBlocks(
-        kCameraBlocks, add_to("cam" + std::to_string(j)), theta->cameras[j]);
+    VisitWithSlopes(add_to("cam" + std::to_string(j)), theta->cameras[j]);
   }
 }
 
@@ -197,8 +203,9 @@ Eigen::VectorXd PriorSigmas(const Rig& rig) {
   VisitBlocks(
       [&](const BlockPlace& place, const auto& value) {
         if (place.info.prior_sigma == 0) return;
-        sigmas.segment(place.offset, TangentDimension(value))
-            .setConstant(place.info.prior_sigma);
+        sigmas.segment(place.offset, TangentDimension(value)) *=
+            place.info.prior_sigma /
+            (kDefaultInReferenceSigmas * place.info.sigma_ref);
       },
       rig.factory);
   for (const ComponentSetting& setting : rig.prior_sigmas) {

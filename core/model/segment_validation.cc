@@ -10,7 +10,9 @@
 
 #include "core/model/calibration.h"
 #include "core/model/image_bounds.h"
+#include "core/model/rig.h"
 #include "core/model/segment.h"
+#include "core/model/temperature.h"
 #include "core/model/violation_list.h"
 
 namespace selfcal {
@@ -56,13 +58,37 @@ void CheckKey(const MotionSegment& segment, ViolationList* list) {
   }
 }
 
+// The calibration must be one at the temperature.
+void CheckSlopes(const Calibration& theta,
+                 double temperature_c,
+                 ViolationList* list) {
+  if (!HasSlopes(theta)) return;
+  const auto faults = Validate(AtTemperature(theta, temperature_c), "");
+  if (faults.empty()) return;
+  list->Add("temperature_c",
+            "is so far from the reference temperature that the slopes lead to "
+            "an impossible calibration: " +
+                faults.front().field + " " + faults.front().message);
+}
+
 void CheckTemperature(const MotionSegment& segment,
+                      const Calibration& theta,
                       const SegmentLimits& limits,
                       ViolationList* list) {
-  if (!segment.temperature_c) return;
+  if (!segment.temperature_c) {
+    if (HasSlopes(theta)) {
+      list->Add("temperature_c",
+                "is missing, and the rig has slopes with temperature; send the "
+                "temperature of the sensors in degrees Celsius");
+    }
+    return;
+  }
   const double c = *segment.temperature_c;
   // The comparison is false for NaN.
-  if (c >= limits.min_temperature_c && c <= limits.max_temperature_c) return;
+  if (c >= limits.min_temperature_c && c <= limits.max_temperature_c) {
+    CheckSlopes(theta, c, list);
+    return;
+  }
   list->Add("temperature_c",
             std::to_string(c) +
                 " is not the temperature of a device; send degrees Celsius, or "
@@ -381,7 +407,7 @@ std::vector<Violation> Validate(const MotionSegment& segment,
                                 const SegmentLimits& limits) {
   ViolationList list(limits.max_violations);
   CheckKey(segment, &list);
-  CheckTemperature(segment, limits, &list);
+  CheckTemperature(segment, theta, limits, &list);
   CheckSessionStart(segment, theta, limits, &list);
   const bool keyframes_counted = CheckCount("keyframes",
                                             segment.keyframes.size(),

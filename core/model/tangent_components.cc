@@ -12,7 +12,7 @@ namespace selfcal {
 namespace {
 
 double ReferenceSigma(const Calibration& theta, const BlockPlace& place) {
-  if (place.info.unit != "px") return place.info.sigma_ref;
+  if (!place.info.unit.starts_with("px")) return place.info.sigma_ref;
   // A calibration without images has no resolution.
   const int width_px = theta.cameras[place.camera].width_px;
   return place.info.sigma_ref * (width_px > 0 ? width_px : kReferenceWidth_px) /

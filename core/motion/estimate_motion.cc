@@ -13,6 +13,7 @@
 #include "core/calibration/working_point.h"
 #include "core/factor/preintegration.h"
 #include "core/model/camera.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -78,7 +79,7 @@ MotionEstimate EstimateMotion(const Rig& rig,
                               MotionSegment* segment) {
   MotionEstimate result;
   result.observations = static_cast<int>(segment->observations.size());
-  if (!AlignMotion(rig, theta, start, segment)) {
+  if (!AlignMotion(rig, *SegmentTheta(theta, *segment), start, segment)) {
     result.failure = "the tracks and the readings do not agree with one motion";
     return result;
   }

@@ -1,7 +1,11 @@
 #include "core/preflight/diagnose.h"
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
+#include "core/model/median.h"
+#include "core/model/temperature.h"
 #include "core/preflight/checks.h"
 #include "core/preflight/motion_data.h"
 
@@ -14,6 +18,17 @@ bool LeavesMotion(FindingKind kind) {
          kind == FindingKind::kDroppedSamples ||
          kind == FindingKind::kRepeatedSamples ||
          kind == FindingKind::kSaturation;
+}
+
+// The median of the segments.
+double UsualTemperature(const Calibration& theta,
+                        std::span<const MotionSegment> segments) {
+  std::vector<double> all_c;
+  for (const MotionSegment& segment : segments) {
+    all_c.push_back(TemperatureOf(theta, segment));
+  }
+  return all_c.empty() ? theta.reference_temperature_c
+                       : UpperMedian(std::move(all_c));
 }
 
 }  // namespace
@@ -57,9 +72,11 @@ std::string_view FindingName(FindingKind kind) {
 }
 
 Diagnosis Diagnose(const Rig& rig,
-                   const Calibration& theta,
+                   const Calibration& of_device,
                    std::span<const MotionSegment> segments) {
   Diagnosis diagnosis;
+  const Calibration theta =
+      AtTemperature(of_device, UsualTemperature(of_device, segments));
   CheckSampling(segments, &diagnosis);
   CheckSaturation(segments, &diagnosis);
   const MotionData data = CollectMotion(segments);

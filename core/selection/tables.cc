@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
+
+#include "core/model/parameter_blocks.h"
 
 namespace selfcal {
 namespace {
@@ -22,7 +25,49 @@ bool Ready(const Rig& rig, const std::vector<Table>& tables) {
   return any_full;
 }
 
+// All of one bin without a width, or without a temperature.
+int BinOf(const TableEntry& entry, double width_k) {
+  if (width_k <= 0 || !entry.temperature_c) return 0;
+  return static_cast<int>(std::floor(*entry.temperature_c / width_k));
+}
+
+// The entry of a full table that a candidate competes with.
+const TableEntry& RivalOf(const TableEntry& candidate,
+                          const std::vector<TableEntry>& entries,
+                          double width_k,
+                          bool* yields) {
+  std::map<int, int> counts;
+  for (const TableEntry& entry : entries) ++counts[BinOf(entry, width_k)];
+  const int own = BinOf(candidate, width_k);
+  const int own_count = counts[own];
+  const int share = std::max<int>(
+      1, static_cast<int>(entries.size()) / static_cast<int>(counts.size()));
+  // The worst of those that meet a condition.
+  const auto worst = [&](const auto& meets) {
+    return std::find_if(entries.rbegin(), entries.rend(), [&](const auto& e) {
+      return meets(BinOf(e, width_k));
+    });
+  };
+  if (own_count < share) {
+    const auto found = worst([&](int bin) { return counts[bin] > share; });
+    *yields = found != entries.rend();
+    if (*yields) return *found;
+  }
+  *yields = false;
+  const auto found = worst([&](int bin) { return bin == own; });
+  return found != entries.rend() ? *found : entries.back();
+}
+
 }  // namespace
+
+double TemperatureBinOf(const Rig& rig) {
+  const std::vector<std::string> blocks = ComponentBlocks(rig.factory);
+  const std::vector<int> free = FreeComponents(rig);
+  const bool slopes = std::any_of(free.begin(), free.end(), [&](int i) {
+    return blocks[i].ends_with(kSlopeSuffix);
+  });
+  return slopes ? kTemperatureBin_k : 0;
+}
 
 bool Better(const TableEntry& a, const TableEntry& b) {
   if (a.entropy != b.entropy) {
@@ -52,7 +97,8 @@ std::vector<Table> MakeTables(const Rig& rig) {
 
 TableUpdate Offer(const TableEntry& candidate,
                   double min_gain_nats,
-                  Table* table) {
+                  Table* table,
+                  double temperature_bin_k) {
   TableUpdate change;
   std::vector<TableEntry>& entries = table->entries;
   for (const TableEntry& entry : entries) {
@@ -65,17 +111,21 @@ TableUpdate Offer(const TableEntry& candidate,
       candidate.gain < min_gain_nats || table->capacity <= 0) {
     return change;
   }
-  if (table->full() && !Better(candidate, entries.back())) {
-    return change;
+  if (table->full()) {
+    bool yields = false;
+    const TableEntry rival =
+        RivalOf(candidate, entries, temperature_bin_k, &yields);
+    if (!yields && !Better(candidate, rival)) {
+      change.rival = rival;
+      return change;
+    }
+    std::erase(entries, rival);
+    change.evicted = rival;
   }
   entries.insert(
       std::upper_bound(entries.begin(), entries.end(), candidate, Better),
       candidate);
   change.inserted = true;
-  if (static_cast<int>(entries.size()) > table->capacity) {
-    change.evicted = entries.back();
-    entries.pop_back();
-  }
   return change;
 }
 

@@ -18,6 +18,8 @@ struct TableEntry {
   std::int64_t sequence = 0;
   double entropy = 0;  // [nat]
   double gain = 0;     // [nat]
+  // Of the device [deg C], if the segment states one.
+  std::optional<double> temperature_c = std::nullopt;
 
   friend bool operator==(const TableEntry&, const TableEntry&) = default;
 };
@@ -47,16 +49,30 @@ std::vector<Table> MakeTables(const Rig& rig);
 struct TableUpdate {
   bool inserted = false;
   std::optional<TableEntry> evicted;
+  // The entry that outranks a candidate that is good enough otherwise.
+  std::optional<TableEntry> rival;
 };
 
+// Width of a bin of temperatures [K], for rigs that estimate slopes with
+// temperature: only segments of different temperatures determine these. Zero
+// for other rigs, whose segments are all in one bin.
+inline constexpr double kTemperatureBin_k = 10;
+double TemperatureBinOf(const Rig& rig);
+
 // Offers one scored segment to a table, and counts it. It enters if its gain is
-// at least min_gain_nats and it is among the N best. A key that is already in
-// the table changes nothing and is not counted. A segment with an entropy or
-// gain that is not finite is counted and never enters. An evicted segment
-// cannot return: the entries that displaced it are better, or equal and older.
+// at least min_gain_nats and it is among the N best. With bins of temperatures,
+// each of the B bins in question has a share of N / B entries (at least one): a
+// candidate whose bin has less replaces the worst of the bins that have more
+// than their share; any other competes with the entries of its own bin, or, if
+// that has none and no other has more than its share, with all. A key that is
+// already in the table changes nothing and is not counted. A segment with an
+// entropy or gain that is not finite is counted and never enters. An evicted
+// segment cannot return: the entries that displaced it are better, or equal and
+// older.
 TableUpdate Offer(const TableEntry& candidate,
                   double min_gain_nats,
-                  Table* table);
+                  Table* table,
+                  double temperature_bin_k = 0);
 
 // All keys in at least one table, once each, sorted by sequence.
 std::vector<TableEntry> UnionOfTables(const std::vector<Table>& tables);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/model/temperature.h"
 #include "core/simulation/exposures.h"
 #include "core/simulation/feature_tracks.h"
 #include "core/simulation/imu_readings.h"
@@ -164,11 +165,15 @@ Calibration ShutterClosed(const Calibration& theta_true,
 }  // namespace
 
 SimulatedSession Simulate(const Rig& rig,
-                          const Calibration& theta_true,
-                          const Calibration& theta_slam,
+                          const Calibration& device_true,
+                          const Calibration& device_slam,
                           const Trajectory& trajectory,
                           const std::string& session,
                           const SimulationOptions& options) {
+  const double temperature_c =
+      options.temperature_c.value_or(device_true.reference_temperature_c);
+  const Calibration theta_true = AtTemperature(device_true, temperature_c);
+  const Calibration theta_slam = AtTemperature(device_slam, temperature_c);
   Recording recording;
   recording.imu = SimulateImu(rig, theta_true.imu, trajectory, options);
   TimeMargins margins = ExposureMargins(
@@ -216,6 +221,7 @@ SimulatedSession Simulate(const Rig& rig,
   for (int s = 0; s < segments; ++s) {
     MotionSegment segment;
     segment.key = {session, s};
+    segment.temperature_c = options.temperature_c;
     segment.session_start_ns = std::llround(-1e9 * options.session_age_s);
     MotionSegment truth = segment;
     const int end = (s + 1) * N;

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,9 @@ struct SimulationOptions {
   double imu_padding_s = kImuPadding_s;
   // Time from the begin of the session to that of the trajectory.
   double session_age_s = 0;
+  // Temperature of the device [deg C], which its segments state; without one
+  // they state none, and it is the reference temperature.
+  std::optional<double> temperature_c = std::nullopt;
   // Errors of the SLAM system, one standard deviation. Most of each drifts
   // slowly, a small part is independent in every keyframe.
   double slam_rotation_rad = 2e-3;  // roll and pitch; yaw drifts 3 times as far
@@ -97,25 +101,25 @@ struct SimulatedSession {
   std::vector<MotionSegment> truth;
 };
 
-// Simulates a session of a rig whose true calibration is theta_true, while the
-// SLAM system uses theta_slam: its landmarks are triangulated with that
-// calibration, and its biases absorb the mean of the resulting errors. Noise,
-// pixel sigma and gravity are those of the rig. Images are exposed later than
-// the time of their keyframe by the true time offset of their camera, and the
-// rows of a rolling shutter one after the other; if the SLAM system assumes
-// other offsets and line delays, its states are those at the middle of its
-// images rather than those of the IMU. A time offset drifts from the begin of
-// the session.
+// Simulates a session of a rig whose true calibration is device_true, while the
+// SLAM system uses device_slam, each at the temperature of the session: its
+// landmarks are triangulated with that calibration, and its biases absorb the
+// mean of the resulting errors. Noise, pixel sigma and gravity are those of the
+// rig. Images are exposed later than the time of their keyframe by the true
+// time offset of their camera, and the rows of a rolling shutter one after the
+// other; if the SLAM system assumes other offsets and line delays, its states
+// are those at the middle of its images rather than those of the IMU. A time
+// offset drifts from the begin of the session.
 //
 // Segments of keyframes_per_segment fill the trajectory from its start;
 // remaining keyframes at the end that do not fill a segment are dropped. Times
 // are relative to the start of the trajectory; keyframes do not coincide with
-// IMU samples, and all exposures lie within these. theta_true and theta_slam
-// must have the same cameras, with a rolling shutter or not; rates, depths,
-// mean_track_length and keyframes_per_segment must be positive.
+// IMU samples, and all exposures lie within these. device_true and
+// device_slam must have the same cameras, with a rolling shutter or not; rates,
+// depths, mean_track_length and keyframes_per_segment must be positive.
 SimulatedSession Simulate(const Rig& rig,
-                          const Calibration& theta_true,
-                          const Calibration& theta_slam,
+                          const Calibration& device_true,
+                          const Calibration& device_slam,
                           const Trajectory& trajectory,
                           const std::string& session,
                           const SimulationOptions& options);

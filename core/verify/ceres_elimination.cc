@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/model/temperature.h"
 #include "core/verify/cholmod_elimination.h"
 #include "core/verify/scorer.h"
 #include "core/verify/segment_problem.h"
@@ -61,15 +62,28 @@ std::vector<double> RootMeanSquares(const Eigen::VectorXd& whitened) {
   return rms;
 }
 
+// The rig without slopes. All of its components are estimated, since slopes of
+// those that it holds may be.
+Rig WithoutSlopes(const Rig& rig) {
+  Rig plain = rig;
+  if (!HasSlopes(rig.factory)) return plain;
+  plain.factory =
+      AtTemperature(rig.factory, rig.factory.reference_temperature_c);
+  plain.fixed.clear();
+  plain.blocks = {{"*", true}};
+  return plain;
+}
+
 }  // namespace
 
 bool HasCeres() { return true; }
 
-LinearisedSegment EliminateByCeres(const Rig& rig,
+LinearisedSegment EliminateByCeres(const Rig& of_device,
                                    const Calibration& theta0,
                                    const MotionSegment& segment,
                                    const InlierSelection& selection,
                                    int gauge_keyframe) {
+  const Rig rig = WithoutSlopes(of_device);
   SegmentProblem problem(rig, theta0, segment, selection, gauge_keyframe);
   const Evaluated evaluated = Evaluate(&problem);
   const Eigen::VectorXd inertial = evaluated.r.segment(

@@ -1,6 +1,9 @@
 #include <map>
 #include <set>
 
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+#include "core/model/temperature.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.pb.h"
 #include "server/api/errors.h"
@@ -32,12 +35,46 @@ absl::StatusOr<v1::Calibration> EncodeNamed(
   return encoded;
 }
 
+absl::StatusOr<v1::Calibration> EncodeAt(const ApiContext& context,
+                                         const StoredCalibration& calibration,
+                                         const std::string& name,
+                                         double temperature_c) {
+  const SegmentLimits limits;
+  if (!(temperature_c >= limits.min_temperature_c &&
+        temperature_c <= limits.max_temperature_c)) {
+    return InvalidFields(
+        {{"temperature_c",
+          "is not the temperature of a device; send degrees Celsius"}});
+  }
+  if (!HasSlopes(calibration.theta)) {
+    return EncodeNamed(context, calibration, name);
+  }
+  const auto faults =
+      Validate(AtTemperature(calibration.theta, temperature_c), "");
+  if (!faults.empty()) {
+    return InvalidFields({{"temperature_c",
+                           "is too far from those of the segments: " +
+                               faults.front().field + " would be impossible"}});
+  }
+  auto rig = context.store->GetRig(calibration.rig);
+  if (!rig.ok()) return About(rig.status(), {kCalibrationType, name, {}});
+  const CalibrationAtTemperature at =
+      AtTemperature(calibration, *std::move(rig), temperature_c);
+  v1::Calibration message = Encode(at.calibration, at.rig);
+  message.set_temperature_c(temperature_c);
+  return message;
+}
+
 absl::StatusOr<v1::Calibration> GetCalibration(
     const ApiContext& context,
     const Call&,
     const v1::GetCalibrationRequest& request) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration calibration,
                            ReadVersion(context.store, "name", request.name()));
+  if (request.has_temperature_c()) {
+    return EncodeAt(
+        context, calibration, request.name(), request.temperature_c());
+  }
   return EncodeNamed(context, calibration, request.name());
 }
 

@@ -20,9 +20,14 @@ std::optional<TableUpdate> OfferToGroup(const Rig& rig,
                                         Table* table) {
   const GroupScore* score = FindGroup(information, table->group);
   if (score == nullptr) return std::nullopt;
-  return Offer({segment.key, segment.sequence, score->entropy, score->gain},
+  return Offer({segment.key,
+                segment.sequence,
+                score->entropy,
+                score->gain,
+                segment.temperature_c},
                rig.min_gain_nats,
-               table);
+               table,
+               TemperatureBinOf(rig));
 }
 
 std::vector<SegmentKey> KeysOf(std::span<const Candidate> candidates) {
@@ -140,6 +145,7 @@ absl::Status ExplainRefusal(UnitOfWork* tx,
                             const Rig& rig,
                             const SegmentRow& segment,
                             const SegmentInformation& information,
+                            const std::optional<TableEntry>& rival_entry,
                             const Table& table) {
   const GroupScore* score = FindGroup(information, table.group);
   const bool outranked = score != nullptr && std::isfinite(score->entropy) &&
@@ -151,7 +157,7 @@ absl::Status ExplainRefusal(UnitOfWork* tx,
                           table.group,
                           {.cause = ExclusionCause::kInsufficientGain});
   }
-  const TableEntry& worst = table.entries.back();
+  const TableEntry& worst = rival_entry.value_or(table.entries.back());
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow rival, FindSegment(tx, worst.key));
   return WriteExclusion(tx,
                         segment.sequence,
@@ -218,7 +224,7 @@ absl::StatusOr<std::vector<std::string>> OfferToTables(
       entered.push_back(table.group);
     } else if (!change->evicted) {
       SELFCAL_RETURN_IF_ERROR(
-          ExplainRefusal(tx, rig, segment, information, table));
+          ExplainRefusal(tx, rig, segment, information, change->rival, table));
     }
   }
   return entered;

@@ -30,6 +30,16 @@ v1::Calibration Encode(const StoredCalibration& calibration,
 absl::StatusOr<v1::Calibration> Encode(Store* store,
                                        const StoredCalibration& calibration);
 
+// A version as it is at a temperature, and its rig: without slopes, with the
+// covariance of the values there.
+struct CalibrationAtTemperature {
+  StoredCalibration calibration;
+  StoredRig rig;
+};
+CalibrationAtTemperature AtTemperature(StoredCalibration calibration,
+                                       StoredRig rig,
+                                       double temperature_c);
+
 // Encodes a run. `calibration` is its result; null if there is none yet.
 v1::Recalibration Encode(const StoredRun& run,
                          const CalibrateProgress& progress,

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "core/model/temperature.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"
 #include "server/convert/convert.h"
@@ -92,6 +94,9 @@ v1::Calibration Encode(const StoredCalibration& calibration,
   SetTime(calibration.create_time_ns, message.mutable_create_time());
   *message.mutable_parameters() = ToProto(calibration.theta);
   FillEstimates(calibration, rig, &message);
+  if (HasSlopes(calibration.theta)) {
+    message.set_temperature_c(calibration.theta.reference_temperature_c);
+  }
   message.mutable_reasons()->Add(calibration.reasons.begin(),
                                  calibration.reasons.end());
   if (calibration.run) {
@@ -110,6 +115,20 @@ v1::Calibration Encode(const StoredCalibration& calibration,
   *message.mutable_verdict() = VerdictMessage(verdict);
   message.mutable_verdict()->set_text(VerdictText(verdict.kind));
   return message;
+}
+
+CalibrationAtTemperature AtTemperature(StoredCalibration calibration,
+                                       StoredRig rig,
+                                       double temperature_c) {
+  const Eigen::MatrixXd by_theta =
+      TemperatureDerivative(calibration.theta, temperature_c);
+  Eigen::MatrixXd& Sigma = calibration.covariance;
+  if (Sigma.rows() == by_theta.cols()) {
+    Sigma = (by_theta * Sigma * by_theta.transpose()).eval();
+  }
+  calibration.theta = AtTemperature(calibration.theta, temperature_c);
+  rig.rig.factory = AtTemperature(rig.rig.factory, temperature_c);
+  return {std::move(calibration), std::move(rig)};
 }
 
 absl::StatusOr<v1::Calibration> Encode(Store* store,

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/model/temperature.h"
 #include "proto/convert.h"
 #include "selfcal/store/records.pb.h"
 #include "server/convert/convert.h"
@@ -50,6 +51,7 @@ std::string SerializeEnds(const SegmentEnds& ends) {
   *record.mutable_theta0() = ToProto(ends.theta0);
   MotionSegment states;
   states.key = ends.key;
+  states.temperature_c = ends.temperature_c;
   states.keyframes = {ends.first, ends.last};
   states.imu = ends.tail;
   *record.mutable_states() = ToProto(states);
@@ -83,6 +85,7 @@ absl::StatusOr<SegmentEnds> ParseEnds(std::string_view bytes) {
     return DamagedRecord(kWhat);
   }
   ends.key = states.key;
+  ends.temperature_c = TemperatureOf(ends.theta0, states);
   ends.first = states.keyframes[0];
   ends.last = states.keyframes[1];
   ends.tail = std::move(states.imu);

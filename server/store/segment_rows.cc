@@ -13,14 +13,18 @@ namespace selfcal::server {
 namespace {
 
 constexpr char kColumns[] =
-    "s.session, s.session_index, s.sequence, s.state, s.steady_ns, s.fit";
+    "s.session, s.session_index, s.sequence, s.state, s.steady_ns, s.fit, "
+    "s.temperature_c";
+constexpr int kNextColumn = 7;  // after these
 
 SegmentRow RowOf(const Statement& row) {
-  return {.key = {row.Text(0), row.Int(1)},
-          .sequence = row.Int(2),
-          .state = static_cast<SegmentState>(row.Int(3) - 1),
-          .receive_steady_ns = row.Int(4),
-          .fit = row.Double(5)};
+  SegmentRow segment{.key = {row.Text(0), row.Int(1)},
+                     .sequence = row.Int(2),
+                     .state = static_cast<SegmentState>(row.Int(3) - 1),
+                     .receive_steady_ns = row.Int(4),
+                     .fit = row.Double(5)};
+  if (!row.IsNull(6)) segment.temperature_c = row.Double(6);
+  return segment;
 }
 
 absl::StatusOr<std::vector<SegmentRow>> ReadRows(Statement* read) {
@@ -382,11 +386,13 @@ absl::StatusOr<std::vector<DataHolder>> DataHolders(
   while (read.Next()) {
     DataHolder& holder = holders.emplace_back();
     holder.segment = RowOf(read);
-    holder.bytes = read.Int(6);
-    holder.in_unfinished_run = read.Int(7) != 0;
-    if (!read.IsNull(8)) holder.gain = read.Double(8);
-    holder.excluded = read.Int(9) != 0;
-    holder.to_report = read.Int(10) != 0;
+    holder.bytes = read.Int(kNextColumn);
+    holder.in_unfinished_run = read.Int(kNextColumn + 1) != 0;
+    if (!read.IsNull(kNextColumn + 2)) {
+      holder.gain = read.Double(kNextColumn + 2);
+    }
+    holder.excluded = read.Int(kNextColumn + 3) != 0;
+    holder.to_report = read.Int(kNextColumn + 4) != 0;
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return holders;

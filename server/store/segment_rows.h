@@ -25,6 +25,7 @@ struct SegmentRow {
   SegmentState state = SegmentState::kStored;
   std::int64_t receive_steady_ns = 0;  // when it arrived, by steady time
   double fit = 0;  // ResidualStatistics::fit; 0: not measured
+  std::optional<double> temperature_c = std::nullopt;  // of the device
 };
 
 // "segment <session>~<index> of rig <rig>", for messages.

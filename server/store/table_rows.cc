@@ -17,7 +17,7 @@ absl::Status ReadEntries(Connection* db,
   Statement read(db,
                  of_rigs.reuse(),
                  "SELECT t.rig, t.group_name, s.session, s.session_index, "
-                 "  s.sequence, t.entropy, t.gain "
+                 "  s.sequence, t.entropy, t.gain, s.temperature_c "
                  "FROM table_entries t CROSS JOIN segments s "
                  "WHERE s.rig = t.rig AND s.sequence = t.sequence AND " +
                      of_rigs.sql());
@@ -29,6 +29,8 @@ absl::Status ReadEntries(Connection* db,
                                read.Int(4),
                                read.Double(5),
                                read.Double(6)});
+      if (read.IsNull(7)) continue;
+      table.entries.back().temperature_c = read.Double(7);
     }
   }
   for (auto& [rig, of_rig] : *tables) {

@@ -1,7 +1,7 @@
 // Models of sensors: one, two and four cameras, whose clocks are off from that
 // of the IMU, or drift; rolling shutters; a camera of each model; gyroscopes
-// that react to acceleration; accelerometers whose axes lie apart. What a model
-// adds is known, estimated, and ignored.
+// that react to acceleration; accelerometers whose axes lie apart; a device
+// that warms up. What a model adds is known, estimated, and ignored.
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdint>
@@ -12,6 +12,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/model/camera_model.h"
+#include "core/model/temperature.h"
 #include "test/core/simulation/rigs.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/estimators.h"
@@ -42,6 +43,8 @@ struct Setting {
   Calibration truth;
   bool ignored = false;
   double apart_s = 0;  // from one segment to the next; 0: of one motion
+  // Of each segment [deg C]; empty: of one motion.
+  std::vector<double> temperatures_c = {};
 };
 
 Setting OffsetSetting(int cameras, Effect effect) {
@@ -98,6 +101,24 @@ Setting DriftSetting(Effect effect) {
   if (effect == Effect::kEstimated) {
     setting.rig.factory.cameras[0].time_drift = 0;
   }
+  setting.ignored = effect == Effect::kIgnored;
+  return setting;
+}
+
+// Six segments from -10 to 60 degrees, of a device whose scales, focal lengths
+// and rotation of the camera vary with temperature.
+Setting TemperatureSetting(Effect effect) {
+  Setting setting;
+  setting.name = "temperature_" + EffectName(effect);
+  setting.seed = 6000;
+  setting.temperatures_c = {-10, 4, 18, 32, 46, 60};
+  setting.rig = RigOfCameras(1);
+  setting.truth = WithSlopes(setting.rig.factory);
+  if (effect == Effect::kKnown) setting.rig.factory = setting.truth;
+  if (effect == Effect::kEstimated) {
+    setting.rig.factory = WithZeroSlopes(setting.rig.factory);
+  }
+  setting.rig.blocks = {{"*_slope", effect == Effect::kEstimated}};
   setting.ignored = effect == Effect::kIgnored;
   return setting;
 }
@@ -172,6 +193,7 @@ std::vector<Setting> Settings() {
   }
   for (const Effect effect : kEffects) {
     settings.push_back(DriftSetting(effect));
+    settings.push_back(TemperatureSetting(effect));
     settings.push_back(GSensitivitySetting(effect));
     settings.push_back(AccelPositionSetting(effect));
   }
@@ -191,6 +213,26 @@ struct Run {
   int degrees = 0;
 };
 
+std::vector<MotionSegment> SegmentsOf(const Setting& setting,
+                                      const Rig& rig,
+                                      double duration_s,
+                                      const SimulationOptions& options) {
+  if (setting.apart_s > 0) {
+    return SimulateApart(rig, setting.truth, 6, setting.apart_s, options);
+  }
+  if (!setting.temperatures_c.empty()) {
+    return SimulateAtTemperatures(
+        rig, setting.truth, setting.temperatures_c, options);
+  }
+  return Simulate(rig,
+                  setting.truth,
+                  rig.factory,
+                  *MakeHandheld(duration_s, 1, options.seed),
+                  "session",
+                  options)
+      .segments;
+}
+
 // nullopt if it does not converge.
 std::optional<Run> RunOne(const Setting& setting,
                           std::uint64_t seed,
@@ -202,15 +244,7 @@ std::optional<Run> RunOne(const Setting& setting,
   options.seed = seed;
   options.landmarks_in_view = 60;
   const std::vector<MotionSegment> segments =
-      setting.apart_s > 0
-          ? SimulateApart(rig, setting.truth, 6, setting.apart_s, options)
-          : Simulate(rig,
-                     setting.truth,
-                     rig.factory,
-                     *MakeHandheld(duration_s, 1, seed),
-                     "session",
-                     options)
-                .segments;
+      SegmentsOf(setting, rig, duration_s, options);
   const CalibrationResult result =
       Calibrate(rig, rig.factory, segments, ComparedOptions());
   if (result.status != CalibrateStatus::kConverged && !setting.ignored) {
@@ -222,6 +256,10 @@ std::optional<Run> RunOne(const Setting& setting,
   truth.imu.gyro_g_sensitivity.conservativeResize(
       imu.gyro_g_sensitivity.size());
   truth.imu.accel_position.conservativeResize(imu.accel_position.size());
+  // The values of one that ignores slopes are compared at the reference.
+  if (!HasSlopes(rig.factory)) {
+    truth = AtTemperature(truth, truth.reference_temperature_c);
+  }
   for (std::size_t j = 0; j < truth.cameras.size(); ++j) {
     if (!rig.factory.cameras[j].line_delay_s) {
       truth.cameras[j].line_delay_s.reset();
@@ -303,6 +341,10 @@ constexpr Block kBlocks[] = {
     {"s_a [1e-3]", "imu.accel.scale.*", 1e-3},
     {"T_s [1e-5 rad s/m]", "imu.gyro.g_sensitivity.*", 1e-5},
     {"r [mm]", "imu.accel.position.*", 1e-3},
+    {"slope of s_g [1e-6/K]", "imu.gyro.scale_slope.*", 1e-6},
+    {"slope of s_a [1e-6/K]", "imu.accel.scale_slope.*", 1e-6},
+    {"slope of q_CI [urad/K]", "*.q_CI_slope.*", 1e-6},
+    {"slope of f [mpx/K]", "*.focal_slope.*", 1e-3},
 };
 
 ResultTable ConsistencyTable() {

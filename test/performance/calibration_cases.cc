@@ -108,7 +108,7 @@ class FirstRound {
                                    CalibrateOptions(),
                                    nullptr)),
         whitening_(WhitenInertialLinks(
-            rig_, rig_.factory.imu, problem_, problem_.keyframes)),
+            rig_, rig_.factory, problem_, problem_.keyframes)),
         basis_(TangentBasis(rig_, WholeSubspace(rig_))) {}
 
   SolverRound Posed(double function_tolerance) const {

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/model/temperature.h"
 #include "test/proto/random_values.h"
 
 namespace selfcal {
@@ -39,6 +40,16 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
   EXPECT_TRUE(SameBits(a.imu.q_AI, b.imu.q_AI));
   EXPECT_TRUE(SameBits(a.imu.gyro_g_sensitivity, b.imu.gyro_g_sensitivity));
   EXPECT_TRUE(SameBits(a.imu.accel_position, b.imu.accel_position));
+  for (const auto slope : {&ImuCalibration::s_g_slope,
+                           &ImuCalibration::m_g_slope,
+                           &ImuCalibration::s_a_slope,
+                           &ImuCalibration::m_a_slope,
+                           &ImuCalibration::q_AI_slope}) {
+    EXPECT_TRUE(SameBits(a.imu.*slope, b.imu.*slope));
+  }
+  if (HasSlopes(a)) {
+    EXPECT_TRUE(SameBits(a.reference_temperature_c, b.reference_temperature_c));
+  }
   ASSERT_EQ(a.cameras.size(), b.cameras.size());
   for (std::size_t j = 0; j < a.cameras.size(); ++j) {
     const CameraCalibration& x = a.cameras[j];
@@ -57,6 +68,12 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
         SameBits(x.line_delay_s.value_or(0), y.line_delay_s.value_or(0)));
     ASSERT_EQ(x.time_drift.has_value(), y.time_drift.has_value());
     EXPECT_TRUE(SameBits(x.time_drift.value_or(0), y.time_drift.value_or(0)));
+    for (const auto slope : {&CameraCalibration::q_CI_slope,
+                             &CameraCalibration::p_CI_slope,
+                             &CameraCalibration::f_slope,
+                             &CameraCalibration::c_slope}) {
+      EXPECT_TRUE(SameBits(x.*slope, y.*slope));
+    }
   }
 }
 

@@ -60,6 +60,10 @@ class RandomValues {
     camera.time_offset_s = Double();
     if (Int(0, 1) == 1) camera.line_delay_s = Double();
     if (Int(0, 1) == 1) camera.time_drift = Double();
+    camera.q_CI_slope = Optional(3 * Int(0, 1));
+    camera.p_CI_slope = Optional(3 * Int(0, 1));
+    camera.f_slope = Optional(2 * Int(0, 1));
+    camera.c_slope = Optional(2 * Int(0, 1));
     return camera;
   }
 
@@ -77,7 +81,13 @@ class RandomValues {
                  Vector3(),
                  Quaternion(),
                  Optional(9 * Int(0, 1)),
-                 Optional(3 * Int(0, 3))};
+                 Optional(3 * Int(0, 3)),
+                 Optional(3 * Int(0, 1)),
+                 Optional(3 * Int(0, 1)),
+                 Optional(3 * Int(0, 1)),
+                 Optional(3 * Int(0, 1)),
+                 Optional(3 * Int(0, 1))};
+    theta.reference_temperature_c = Double();
     for (int i = Int(0, 4); i > 0; --i) theta.cameras.push_back(Camera());
     return theta;
   }

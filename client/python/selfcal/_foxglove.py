@@ -259,6 +259,18 @@ def losses(calibration: v1.CalibrationParameters) -> list[str]:
                 f"{camera.time_drift:g} s each second is not included; images "
                 "keep their own timestamps"
             )
+        if any(
+            (
+                camera.q_ci_slope,
+                camera.p_ci_slope,
+                camera.f_slope,
+                camera.c_slope,
+            )
+        ):
+            lost.append(
+                f"cam{number}: its slopes with temperature are not included; "
+                "the values are those at the reference temperature"
+            )
     scales = calibration.imu
     if any(
         value != nominal

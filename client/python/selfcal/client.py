@@ -146,11 +146,17 @@ class Daemon:
         return self.segment_service.StreamSegments(iter(requests))
 
     def calibration(
-        self, rig_id: str, version: str = "active"
+        self,
+        rig_id: str,
+        version: str = "active",
+        *,
+        temperature_c: float | None = None,
     ) -> calibration.Calibration:
+        """A version, at a temperature if one is given: without slopes then."""
         return self.calibration_service.GetCalibration(
             calibration.GetCalibrationRequest(
-                name=f"rigs/{rig_id}/calibrations/{version}"
+                name=f"rigs/{rig_id}/calibrations/{version}",
+                temperature_c=temperature_c,
             ),
             timeout=self._timeout_s,
         )

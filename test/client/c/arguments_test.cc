@@ -93,6 +93,7 @@ TEST_F(ArgumentsTest, NullIsAnErrorOfEachFunctionThatHasErrors) {
   selfcal_builder* builder = nullptr;
   selfcal_stream* stream = nullptr;
   selfcal_watch* watch = nullptr;
+  selfcal_calibration* at = nullptr;
   double v[3] = {0, 0, 0};
   selfcal_error* const e = nullptr;
   const std::vector<std::int32_t> codes = {
@@ -133,6 +134,7 @@ TEST_F(ArgumentsTest, NullIsAnErrorOfEachFunctionThatHasErrors) {
       selfcal_calibration_get_covariance(nullptr, v, 1, e),
       selfcal_calibration_correct_imu(nullptr, v, v, v, v, v, v, e),
       selfcal_calibration_carry_biases(nullptr, nullptr, v, v, v, e),
+      selfcal_calibration_at_temperature(nullptr, 0, &at, e),
       selfcal_calibration_project(nullptr, 0, v, v, e),
       selfcal_calibration_unproject(nullptr, 0, v, v, e),
   };

@@ -47,11 +47,13 @@ Calibration Theta() {
   return theta;
 }
 
-v1::Calibration Message(std::int64_t version, bool with_covariance) {
+v1::Calibration Message(std::int64_t version,
+                        bool with_covariance,
+                        const Calibration& theta = Theta()) {
   v1::Calibration message;
   message.set_version(version);
-  *message.mutable_parameters() = ToProto(Theta());
-  const int size = TangentSize(Theta());
+  *message.mutable_parameters() = ToProto(theta);
+  const int size = TangentSize(theta);
   for (int i = 0; with_covariance && i < size * (size + 1) / 2; ++i) {
     message.add_covariance(1 + i);
   }
@@ -139,6 +141,43 @@ TEST_F(CalibrationTest, HasTheValuesThatWerePublished) {
     EXPECT_EQ(camera.clock_drifts, j == 1 ? 1 : 0);
     EXPECT_EQ(camera.time_drift, j == 1 ? 2e-5 : 0);
   }
+}
+
+TEST_F(CalibrationTest, WithSlopesIsReadAtATemperature) {
+  Calibration theta = Theta();
+  theta.imu.s_g_slope = Eigen::Vector3d(1e-3, 2e-3, -0.03);
+  theta.cameras[1].f_slope = Eigen::Vector2d(0.1, 0.2);
+  Receive(Message(7, true, theta));
+  selfcal_calibration* at = nullptr;
+  ASSERT_EQ(selfcal_calibration_at_temperature(calibration_, 35, &at, &error_),
+            0)
+      << error_.message;
+  EXPECT_EQ(selfcal_calibration_version(at), 7);
+  EXPECT_EQ(selfcal_calibration_component_count(at), TangentSize(Theta()));
+  EXPECT_EQ(selfcal_calibration_component_count(calibration_),
+            TangentSize(Theta()) + 5);
+  selfcal_imu imu = {};
+  imu.struct_size = sizeof(imu);
+  ASSERT_EQ(selfcal_calibration_get_imu(at, &imu, nullptr), 0);
+  EXPECT_NEAR(imu.gyro_scale[0], 1.01 + 10 * 1e-3, 1e-12);
+  selfcal_camera camera = {};
+  camera.struct_size = sizeof(camera);
+  ASSERT_EQ(selfcal_calibration_get_camera(at, 1, &camera, nullptr), 0);
+  EXPECT_NEAR(camera.f[1], 510 + 10 * 0.2, 1e-9);
+  const auto size = static_cast<std::size_t>(TangentSize(Theta()));
+  std::vector<double> covariance(size * size);
+  ASSERT_EQ(selfcal_calibration_get_covariance(
+                at, covariance.data(), covariance.size(), nullptr),
+            0);
+  EXPECT_GT(covariance[0], 1);  // that of the slope is in it
+  selfcal_calibration_destroy(at);
+  at = calibration_;
+  EXPECT_EQ(selfcal_calibration_at_temperature(calibration_, 80, &at, &error_),
+            SELFCAL_INVALID_ARGUMENT);
+  EXPECT_EQ(at, nullptr);
+  EXPECT_NE(std::string(error_.message).find("s_g must be positive"),
+            std::string::npos)
+      << error_.message;
 }
 
 TEST_F(CalibrationTest, NamesEachComponentWithItsSigma) {

@@ -279,6 +279,23 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
   }
 }
 
+TEST_P(Export, SlopesAreNamedAndTheValuesAreThoseOfTheReference) {
+  RandomValues random(19);
+  Rig rig = RandomRig(GetParam(), &random);
+  const auto plain = ExportRig(GetParam().format, rig, rig.factory, {});
+  ASSERT_TRUE(plain.ok()) << plain.status();
+  rig.factory.imu.s_g_slope = Eigen::Vector3d(1e-4, 2e-4, 3e-4);
+  rig.factory.cameras[0].f_slope = Eigen::Vector2d(0.02, 0.03);
+  const auto files = ExportRig(GetParam().format, rig, rig.factory, {});
+  ASSERT_TRUE(files.ok()) << files.status();
+  const std::vector<std::string> names = Names(files->losses);
+  EXPECT_EQ(std::count(names.begin(), names.end(), "slopes"), 1);
+  ASSERT_EQ(files->files.size(), plain->files.size());
+  for (std::size_t i = 0; i < files->files.size(); ++i) {
+    EXPECT_EQ(files->files[i].text, plain->files[i].text);
+  }
+}
+
 TEST_P(Export, OptionalBlocksOfTheImuAreWrittenOrNamed) {
   RandomValues random(20);
   Rig rig = RandomRig(GetParam(), &random);

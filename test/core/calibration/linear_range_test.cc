@@ -23,7 +23,7 @@ class Simulated {
         estimate_{Eigen::VectorXd::Zero(nothing_.rows()),
                   session_.problem.keyframes},
         whitening_(WhitenInertialLinks(rig(),
-                                       rig().factory.imu,
+                                       rig().factory,
                                        session_.problem,
                                        session_.problem.keyframes)) {}
 

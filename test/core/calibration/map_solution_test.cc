@@ -36,7 +36,7 @@ Estimate Solve(const Rig& rig,
   Screening screening = ScreenLandmarks(
       rig, rig.factory, problem, problem.keyframes, motions, {}, nullptr);
   const std::vector<InertialMatrix> whitening =
-      WhitenInertialLinks(rig, rig.factory.imu, problem, problem.keyframes);
+      WhitenInertialLinks(rig, rig.factory, problem, problem.keyframes);
   const Eigen::MatrixXd basis = TangentBasis(rig, WholeSubspace(rig));
   const SolverRound round = {.rig = rig,
                              .reference = rig.factory,

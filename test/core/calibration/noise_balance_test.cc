@@ -45,8 +45,7 @@ struct Solved {
     for (std::size_t i = 0; i < landmarks.size(); i += 5) {
       landmarks[i].weight = 0.5;
     }
-    whitening =
-        WhitenInertialLinks(rig, theta.imu, problem, estimate.keyframes);
+    whitening = WhitenInertialLinks(rig, theta, problem, estimate.keyframes);
     const auto go_on = [](int, double, const Eigen::VectorXd&) {
       return SolverSignal::kGoOn;
     };

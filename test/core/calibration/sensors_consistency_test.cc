@@ -11,6 +11,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/information/segment_information.h"
+#include "core/model/temperature.h"
 #include "core/simulation/simulate.h"
 #include "test/core/calibration/simulated_errors.h"
 #include "test/core/simulation/rigs.h"
@@ -150,6 +151,83 @@ TEST(ClockDrift, InAShortSessionIsKnownAsWellAsIsClaimed) {
     rig.groups = DefaultGroups(rig.blocks, rig.factory);
     return CalibrateSimulated(rig, truth, seed);
   });
+}
+
+// A device at -5 to 55 degrees, whose scales, focal lengths and extrinsics vary
+// with temperature.
+const std::vector<double> kTemperatures_c = {-5, 15, 35, 55};
+
+std::vector<BlockSetting> EstimatedSlopes(bool estimated) {
+  return {{"imu.gyro.scale_slope", estimated},
+          {"imu.accel.scale_slope", estimated},
+          {"*.q_CI_slope", estimated},
+          {"*.focal_slope", estimated}};
+}
+
+TEST(Temperature, OfKnownSlopesEverythingIsFoundWithinItsSigmas) {
+  const Calibration truth = WithSlopes(RigOfCameras(2).factory);
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = RigOfCameras(2);
+    rig.factory = PerturbCalibration(truth, {}, seed);
+    rig.blocks = EstimatedSlopes(false);
+    rig.groups = DefaultGroups(rig.blocks, rig.factory);
+    return CalibrateSimulated(
+        rig, truth, seed, {.temperatures_c = kTemperatures_c});
+  });
+}
+
+TEST(Temperature, SlopesAreFoundWithTheRest) {
+  const Calibration truth = WithSlopes(RigOfCameras(1).factory);
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = RigOfCameras(1);
+    rig.factory = PerturbCalibration(WithZeroSlopes(rig.factory), {}, seed);
+    rig.blocks = EstimatedSlopes(true);
+    rig.groups = DefaultGroups(rig.blocks, rig.factory);
+    const Errors errors = CalibrateSimulated(
+        rig, truth, seed, {.temperatures_c = kTemperatures_c});
+    const auto last = errors.error.size() - 1;
+    const double sigma = std::sqrt(errors.covariance(last, last));
+    std::printf("slope of f_y: %.4f px/K off, sigma %.4f px/K\n",
+                errors.error(last),
+                sigma);
+    EXPECT_LT(std::abs(errors.error(last)), 3.3 * sigma);
+    EXPECT_LT(sigma, 0.5 * truth.cameras[0].f_slope.y());
+    return errors;
+  });
+}
+
+// Segments of one temperature say nothing about slopes, and the rest is that at
+// this temperature.
+TEST(Temperature, OfOneTemperatureTheValuesThereAreFound) {
+  const Calibration truth = WithSlopes(RigOfCameras(1).factory);
+  constexpr double kWarm_c = 45;
+  SimulationOptions options;
+  options.keyframes_per_segment = 30;
+  options.landmarks_in_view = 60;
+  Rig rig = RigOfCameras(1);
+  rig.factory = PerturbCalibration(WithZeroSlopes(rig.factory), {}, 7);
+  rig.blocks = EstimatedSlopes(true);
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  const CalibrationResult result =
+      Calibrate(rig,
+                rig.factory,
+                SimulateAtTemperatures(
+                    rig, truth, {kWarm_c, kWarm_c, kWarm_c, kWarm_c}, options));
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  const Eigen::VectorXd error = BoxMinus(AtTemperature(result.theta, kWarm_c),
+                                         AtTemperature(truth, kWarm_c));
+  const Eigen::MatrixXd by_theta = TemperatureDerivative(result.theta, kWarm_c);
+  const Eigen::VectorXd there =
+      (by_theta * result.covariance * by_theta.transpose())
+          .diagonal()
+          .cwiseSqrt();
+  const Eigen::VectorXd reference = result.covariance.diagonal().cwiseSqrt();
+  for (int i = 0; i < error.size(); ++i) {
+    EXPECT_LE(std::abs(error(i)), 4 * there(i)) << i;
+  }
+  // 20 K away, the unknown slope counts.
+  const int focal = CameraTangentOffset(truth, 0) + kCameraIntrinsics;
+  EXPECT_LT(there(focal), 0.5 * reference(focal));
 }
 
 // Other parameters of the same rig are known equally well, and estimated as

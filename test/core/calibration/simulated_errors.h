@@ -37,7 +37,28 @@ struct SessionKind {
   // If not zero, this much time passes from one of its four segments to the
   // next.
   double apart_s = 0;
+  // If not empty, the temperatures of its four segments [deg C].
+  std::vector<double> temperatures_c = {};
 };
+
+inline std::vector<MotionSegment> SimulateKind(const Rig& rig,
+                                               const Calibration& truth,
+                                               const SimulationOptions& options,
+                                               const SessionKind& kind) {
+  if (kind.apart_s > 0) {
+    return SimulateApart(rig, truth, 4, kind.apart_s, options);
+  }
+  if (!kind.temperatures_c.empty()) {
+    return SimulateAtTemperatures(rig, truth, kind.temperatures_c, options);
+  }
+  return Simulate(rig,
+                  truth,
+                  rig.factory,
+                  *MakeHandheld(12.5, 1, options.seed),
+                  "s",
+                  options)
+      .segments;
+}
 
 // `rig` has the factory calibration; `truth` is the true one, and `expected`
 // the part of it that the rig has.
@@ -51,14 +72,7 @@ inline Errors CalibrateSimulated(const Rig& rig,
   options.landmarks_in_view = kind.landmarks_in_view;
   options.keyframes_per_segment = 30;
   const std::vector<MotionSegment> segments =
-      kind.apart_s > 0 ? SimulateApart(rig, truth, 4, kind.apart_s, options)
-                       : Simulate(rig,
-                                  truth,
-                                  rig.factory,
-                                  *MakeHandheld(12.5, 1, seed),
-                                  "s",
-                                  options)
-                             .segments;
+      SimulateKind(rig, truth, options, kind);
   EXPECT_EQ(segments.size(), 4u);
   const CalibrationResult result = Calibrate(rig, rig.factory, segments);
   EXPECT_EQ(result.status, CalibrateStatus::kConverged)

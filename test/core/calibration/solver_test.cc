@@ -13,6 +13,7 @@
 #include "core/calibration/theta_information.h"
 #include "core/model/so3.h"
 #include "core/simulation/simulate.h"
+#include "test/core/simulation/rigs.h"
 
 namespace selfcal {
 namespace {
@@ -68,8 +69,8 @@ class Posed {
                                    motions_,
                                    options,
                                    nullptr)),
-        whitening_(
-            WhitenInertialLinks(rig, start.imu, problem_, problem_.keyframes)),
+        whitening_(WhitenInertialLinks(
+            rig, ChainThetas(start, problem_), problem_, problem_.keyframes)),
         subspace_(WholeSubspace(rig)),
         prior_(options.prior) {}
 
@@ -260,6 +261,27 @@ TEST(Solvers, AgreeWithFixedComponents) {
   Rig rig = HandheldRig("r");
   rig.fixed = {"imu.q_AI.*", "cam0.distortion.w"};
   Simple({}, SmallestOptions(4), rig).ExpectSameMinimum();
+}
+
+// Chains of different temperatures, of a device with slopes.
+TEST(Solvers, AgreeOnSlopesWithTemperature) {
+  Rig rig = HandheldRig("r");
+  rig.factory = WithSlopes(rig.factory);
+  rig.factory.imu.q_AI_slope = Eigen::Vector3d(1e-4, -2e-4, 1e-4);
+  rig.factory.cameras[0].p_CI_slope = Eigen::Vector3d(1e-5, 2e-5, -1e-5);
+  rig.factory.cameras[0].c_slope = Eigen::Vector2d(0.02, -0.03);
+  rig.blocks = {{"*_slope", true}};
+  const Calibration truth = rig.factory;
+  rig = WrongRig(rig);
+  SimulationOptions simulation = SmallestOptions(12);
+  simulation.keyframes_per_segment = 30;
+  Posed posed(
+      rig,
+      truth,
+      SimulateAtTemperatures(rig, truth, {-10, 30, 31, 70}, simulation));
+  EXPECT_EQ(posed.problem().chain_temperatures_c,
+            (std::vector<double>{-10, 30, 31, 70}));
+  posed.ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeWithAPrior) {

@@ -232,6 +232,26 @@ TEST(ValidateSegment, TemperatureIsThatOfADeviceOrUnknown) {
   EXPECT_THAT(Validate(segment, Theta()), IsEmpty());
 }
 
+TEST(ValidateSegment, SlopesNeedATemperatureAtWhichTheyArePossible) {
+  MotionSegment segment = ValidSegment();
+  segment.temperature_c.reset();
+  Calibration theta = Theta();
+  theta.imu.s_g_slope = Eigen::Vector3d::Constant(-0.02);
+  const auto expect = [&](const char* part) {
+    const std::vector<Violation> violations = Validate(segment, theta);
+    ASSERT_EQ(violations.size(), 1u) << part;
+    EXPECT_EQ(violations[0].field, "temperature_c");
+    EXPECT_THAT(violations[0].message, testing::HasSubstr(part));
+  };
+  expect("is missing");
+  segment.temperature_c = 60;
+  EXPECT_THAT(Validate(segment, theta), IsEmpty());
+  segment.temperature_c = 80;
+  expect("imu.s_g must be positive");
+  segment.temperature_c = kNan;
+  expect("is not the temperature of a device");
+}
+
 TEST(ValidateSegment, ClocksThatDriftNeedTheBeginOfTheSession) {
   MotionSegment segment = ValidSegment();
   Calibration theta = Theta();

@@ -3,9 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 #include <string>
+
+#include "core/simulation/simulate.h"
 
 namespace selfcal {
 namespace {
@@ -110,6 +114,90 @@ TEST(Tables, OfTwoEquallyRichTheOlderStays) {
   const TableUpdate change = Offer(Entry(3, 0.5), 1, &table);
   ASSERT_TRUE(change.evicted.has_value());
   EXPECT_EQ(change.evicted->sequence, 1);
+}
+
+TableEntry At(int id, double entropy, double temperature_c) {
+  TableEntry entry = Entry(id, entropy);
+  entry.temperature_c = temperature_c;
+  return entry;
+}
+
+std::map<int, int> Bins(const Table& table) {
+  std::map<int, int> counts;
+  for (const TableEntry& entry : table.entries) {
+    ++counts[static_cast<int>(
+        std::floor(*entry.temperature_c / kTemperatureBin_k))];
+  }
+  return counts;
+}
+
+TEST(Tables, KeepTemperaturesApartForRigsThatNeedThem) {
+  Table table = MakeTable(8);
+  int id = 0;
+  // Of one temperature, the best stay.
+  for (; id < 20; ++id) {
+    Offer(At(id, -id, 31), 1, &table, kTemperatureBin_k);
+  }
+  EXPECT_EQ(table.entries.size(), 8u);
+  EXPECT_EQ(table.entries.back().entropy, -12);
+  // Poorer segments of another temperature get half of the places, those of the
+  // worst; then only better ones of their own temperature.
+  for (; id < 30; ++id) {
+    const TableUpdate change =
+        Offer(At(id, 100 + id, 52), 1, &table, kTemperatureBin_k);
+    EXPECT_EQ(change.inserted, id < 24);
+    if (change.inserted) {
+      EXPECT_EQ(change.evicted->entropy, 8 - id);
+    } else {
+      EXPECT_EQ(change.rival->entropy, 123);
+    }
+  }
+  EXPECT_EQ(Bins(table), (std::map<int, int>{{3, 4}, {5, 4}}));
+  EXPECT_FALSE(Offer(At(40, 0, 33), 1, &table, kTemperatureBin_k).inserted);
+  EXPECT_EQ(
+      Offer(At(41, 110, 57), 1, &table, kTemperatureBin_k).evicted->entropy,
+      123);
+  // A third temperature: a share is 8 / 3 = 2.
+  for (id = 50; id < 60; ++id) {
+    Offer(At(id, 200, 8), 1, &table, kTemperatureBin_k);
+  }
+  EXPECT_EQ(Bins(table)[0], 2);
+  // Without bins, the temperature does not matter.
+  EXPECT_TRUE(Offer(At(70, -100, 8), 1, &table).inserted);
+}
+
+// However many temperatures there are, the table is not larger, and none that
+// has one segment loses it to a temperature that has another.
+TEST(Tables, HaveSegmentsOfAsManyTemperaturesAsTheyHavePlaces) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> entropy(-10, 10), celsius(-40, 85);
+  for (int trial = 0; trial < 50; ++trial) {
+    Table table = MakeTable(6);
+    std::size_t distinct = 0;
+    for (int id = 0; id < 200; ++id) {
+      Offer(At(id, entropy(random), celsius(random)),
+            1,
+            &table,
+            kTemperatureBin_k);
+      ASSERT_LE(table.entries.size(), 6u);
+      ASSERT_TRUE(
+          std::is_sorted(table.entries.begin(), table.entries.end(), Better));
+      if (table.full()) {
+        ASSERT_GE(Bins(table).size(), distinct);
+        distinct = Bins(table).size();
+      }
+    }
+    EXPECT_EQ(distinct, 6u);
+  }
+}
+
+TEST(Tables, OfARigThatEstimatesSlopesHaveBins) {
+  Rig rig = HandheldRig("r");
+  EXPECT_EQ(TemperatureBinOf(rig), 0);
+  rig.factory.imu.s_g_slope = Eigen::Vector3d::Constant(1e-4);
+  EXPECT_EQ(TemperatureBinOf(rig), 0) << "known slopes need no temperatures";
+  rig.blocks = {{"imu.gyro.scale_slope", true}};
+  EXPECT_EQ(TemperatureBinOf(rig), kTemperatureBin_k);
 }
 
 TEST(Tables, AnEvictedSegmentCannotComeBack) {

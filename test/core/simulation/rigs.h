@@ -6,6 +6,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/model/camera_model.h"
@@ -123,29 +124,80 @@ inline SimulationOptions PerfectSlam() {
   return options;
 }
 
-// Single segments, each of its own motion, with this much time from one to the
-// next since their sessions began.
-inline std::vector<MotionSegment> SimulateApart(const Rig& rig,
-                                                const Calibration& truth,
-                                                int count,
-                                                double apart_s,
-                                                SimulationOptions options) {
-  const std::uint64_t seed = options.seed;
+// Single segments, each of its own motion and in a session of its own;
+// change(i, &options) sets what differs in segment i.
+template <typename Change>
+std::vector<MotionSegment> SimulateSingly(const Rig& rig,
+                                          const Calibration& truth,
+                                          int count,
+                                          const SimulationOptions& options,
+                                          const Change& change) {
   const double segment_s =
       options.keyframes_per_segment / options.keyframe_rate_hz;
   std::vector<MotionSegment> segments;
   for (int i = 0; i < count; ++i) {
-    options.seed = 100 * seed + static_cast<std::uint64_t>(i);
-    options.session_age_s = i * apart_s;
+    SimulationOptions own = options;
+    own.seed = 100 * options.seed + static_cast<std::uint64_t>(i);
+    change(i, &own);
     segments.push_back(Simulate(rig,
                                 truth,
                                 rig.factory,
-                                *MakeHandheld(segment_s + 0.5, 1, options.seed),
+                                *MakeHandheld(segment_s + 0.5, 1, own.seed),
                                 "apart-" + std::to_string(i),
-                                options)
+                                own)
                            .segments.front());
   }
   return segments;
+}
+
+// With this much time from one to the next since their sessions began.
+inline std::vector<MotionSegment> SimulateApart(
+    const Rig& rig,
+    const Calibration& truth,
+    int count,
+    double apart_s,
+    const SimulationOptions& options) {
+  return SimulateSingly(
+      rig, truth, count, options, [&](int i, SimulationOptions* own) {
+        own->session_age_s = i * apart_s;
+      });
+}
+
+// At these temperatures.
+inline std::vector<MotionSegment> SimulateAtTemperatures(
+    const Rig& rig,
+    const Calibration& truth,
+    const std::vector<double>& temperatures_c,
+    const SimulationOptions& options) {
+  const int count = static_cast<int>(temperatures_c.size());
+  return SimulateSingly(
+      rig, truth, count, options, [&](int i, SimulationOptions* own) {
+        own->temperature_c = temperatures_c[i];
+      });
+}
+
+// Gives a device slopes of the size of low-cost parts: 0.02 % per kelvin of
+// scales, 1e-4 of the focal length, 0.002 degrees between camera and IMU.
+inline Calibration WithSlopes(Calibration theta) {
+  theta.imu.s_g_slope = Eigen::Vector3d(2e-4, -1.5e-4, 1e-4);
+  theta.imu.s_a_slope = Eigen::Vector3d(-2e-4, 1e-4, 2e-4);
+  for (CameraCalibration& camera : theta.cameras) {
+    camera.q_CI_slope = Eigen::Vector3d(3e-5, -2e-5, 4e-5);
+    camera.f_slope = 1e-4 * camera.f;
+  }
+  return theta;
+}
+
+// The same, with slopes that are zero: what is to be estimated.
+inline Calibration WithZeroSlopes(Calibration theta) {
+  theta = WithSlopes(std::move(theta));
+  theta.imu.s_g_slope.setZero();
+  theta.imu.s_a_slope.setZero();
+  for (CameraCalibration& camera : theta.cameras) {
+    camera.q_CI_slope.setZero();
+    camera.f_slope.setZero();
+  }
+  return theta;
 }
 
 // A device moved vigorously, whose SLAM system believes a perturbed

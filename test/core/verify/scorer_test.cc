@@ -11,6 +11,7 @@
 #include "core/verify/compare_scores.h"
 #include "test/core/information/simple_motions.h"
 #include "test/core/information/test_segments.h"
+#include "test/core/simulation/rigs.h"
 #include "test/recordings.h"
 
 namespace selfcal {
@@ -89,6 +90,20 @@ TEST(Scorers, AgreeOnEveryLensWithTimesAndHeldComponents) {
   ScoreOptions gauge;
   gauge.gauge_keyframe = 7;
   ExpectSame(rig, theta0, segment, gauge);
+}
+
+TEST(Scorers, AgreeOnSlopesWithTemperature) {
+  Rig rig = TwoCameraRig();
+  rig.factory = WithSlopes(rig.factory);
+  rig.factory.imu.q_AI_slope = Eigen::Vector3d(1e-4, -2e-4, 1e-4);
+  rig.blocks = {{"*_slope", true}};
+  rig.fixed = {"cam1.focal.*", "imu.gyro.scale_slope.y"};
+  const Calibration theta0 = PerturbCalibration(rig.factory, {}, 3);
+  SimulationOptions options;
+  options.temperature_c = 58;
+  ExpectSame(rig,
+             theta0,
+             OneSegment(rig, theta0, *MakeHandheld(4.1, 1, 3), options).slam);
 }
 
 TEST(Scorers, AgreeWhereNothingIsEstimated) {

@@ -64,6 +64,36 @@ TEST_P(ScoresTest, OldInformationSaysNothingAboutTimeOffsets) {
   EXPECT_EQ(stored.eta(size - 1), 0);
 }
 
+// A segment of another temperature enters although it is poorer, and the one
+// that it replaces says why it left.
+TEST_P(ScoresTest, TablesOfARigWithSlopesKeepTemperaturesApart) {
+  Rig rig = TestRig("a");
+  rig.factory.imu.s_g_slope = Eigen::Vector3d::Zero();
+  rig.blocks = {{"imu.gyro.scale_slope", true}};
+  rig.table_size = 2;
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  const auto arrive = [&](int k, double temperature_c, double entropy) {
+    MotionSegment segment = Segment(k);
+    segment.temperature_c = temperature_c;
+    ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
+    Score(rig, k, entropy);
+  };
+  arrive(0, 22, 1);
+  arrive(1, 25, 2);
+  arrive(2, 28, 3);
+  EXPECT_THAT(TableIndices("a", 0), ElementsAre(0, 1));
+  arrive(3, 51, 9);
+  EXPECT_THAT(TableIndices("a", 0), ElementsAre(0, 3));
+  arrive(4, 55, 10);
+  EXPECT_THAT(TableIndices("a", 0), ElementsAre(0, 3));
+  arrive(5, 24, 0);
+  EXPECT_THAT(TableIndices("a", 0), ElementsAre(5, 3));
+  Reopen();
+  EXPECT_THAT(TableIndices("a", 0), ElementsAre(5, 3));
+  arrive(6, 54, 8);
+  EXPECT_THAT(TableIndices("a", 0), ElementsAre(5, 6));
+}
+
 TEST_P(ScoresTest, EvictionDropsTheDataAndKeepsTheInformation) {
   const Rig rig = CreateTestRig("a");  // tables of 2
   for (int k = 0; k < 3; ++k) Put("a", k);

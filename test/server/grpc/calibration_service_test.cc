@@ -75,6 +75,53 @@ TEST_F(CalibrationServiceTest, VersionShowsEstimatesWithSigmas) {
   EXPECT_EQ(read.covariance_size(), size * (size + 1) / 2);
 }
 
+TEST_F(CalibrationServiceTest, VersionWithSlopesIsReadAtATemperature) {
+  Rig rig = TestRig("warm");
+  rig.factory.cameras[0].f_slope = Eigen::Vector2d(0.05, 0.04);
+  rig.blocks = {{"cam0.focal_slope", true}};
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  v1::Calibration stored, read;
+  ASSERT_TRUE(Get("rigs/warm/calibrations/1", &stored).ok());
+  EXPECT_EQ(stored.temperature_c(), 25);
+  EXPECT_EQ(stored.parameters().reference_temperature_c(), 25);
+  v1::GetCalibrationRequest request;
+  request.set_name("rigs/warm/calibrations/1");
+  request.set_temperature_c(45);
+  const auto get = [&] {
+    Context context;
+    return calibrations_->GetCalibration(&context, request, &read);
+  };
+  ASSERT_TRUE(get().ok());
+  EXPECT_EQ(read.temperature_c(), 45);
+  EXPECT_EQ(read.parameters().cameras(0).f_slope_size(), 0);
+  EXPECT_NEAR(read.parameters().cameras(0).f().x(),
+              stored.parameters().cameras(0).f().x() + 20 * 0.05,
+              1e-9);
+  ASSERT_EQ(read.estimates_size() + 2, stored.estimates_size());
+  const int slope = stored.estimates_size() - 2;
+  EXPECT_EQ(stored.estimates(slope).component(), "cam0.focal_slope.x");
+  for (int i = 0; i < read.estimates_size(); ++i) {
+    const auto& now = read.estimates(i);
+    EXPECT_EQ(now.component(), stored.estimates(i).component());
+    EXPECT_EQ(now.from_factory(), 0);
+    const double more =
+        now.component() == "cam0.focal.x" || now.component() == "cam0.focal.y"
+            ? 20 * stored.estimates(slope).sigma()
+            : 0;
+    EXPECT_NEAR(
+        now.sigma(), std::hypot(stored.estimates(i).sigma(), more), 1e-9)
+        << now.component();
+  }
+  request.set_temperature_c(1000);
+  EXPECT_EQ(get().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  // A rig without slopes is the same at every temperature.
+  AddRig();
+  request.set_name("rigs/r/calibrations/1");
+  request.set_temperature_c(45);
+  ASSERT_TRUE(get().ok());
+  EXPECT_FALSE(read.has_temperature_c());
+}
+
 TEST_F(CalibrationServiceTest, VersionShowsWhereItCameFrom) {
   AddCalibrated();
   v1::Calibration read;

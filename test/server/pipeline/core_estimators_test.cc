@@ -1,4 +1,5 @@
 // The estimators of core in the pipeline: simulated segments become a version.
+#include "test/core/simulation/rigs.h"
 #include "test/server/pipeline/pipeline_test.h"
 
 namespace selfcal::server {
@@ -74,6 +75,53 @@ TEST_F(CoreEstimatorsTest, OptionalBlocksOfANewRigAreEstimated) {
         << i;
   }
   EXPECT_LT(std::sqrt(version->covariance(added.back(), added.back())), 1e-6);
+}
+
+// A device that is used between 0 and 60 degrees, of whose slopes the rig knows
+// nothing.
+TEST_F(CoreEstimatorsTest, SlopesOfADeviceThatWarmsUpAreEstimated) {
+  Rig rig = HandheldRig("a");
+  const Calibration truth = WithSlopes(rig.factory);
+  rig.blocks = {{"imu.gyro.scale_slope", true},
+                {"imu.accel.scale_slope", true},
+                {"*.q_CI_slope", true},
+                {"*.focal_slope", true}};
+  AddEstimatedBlocks(rig.blocks, &rig.factory);
+  rig.factory = PerturbCalibration(rig.factory, {}, 3);
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  SimulationOptions options;
+  options.seed = 3;
+  const std::vector<MotionSegment> segments = SimulateAtTemperatures(
+      rig, truth, {0, 20, 40, 60, 0, 20, 40, 60, 0, 20, 40, 60}, options);
+  StartOne();
+  for (const MotionSegment& segment : segments) {
+    const auto result = pipeline_->Submit("a", segment, nullptr);
+    ASSERT_TRUE(result.ok()) << result.status();
+    ASSERT_EQ(result->verdict, SubmitResult::Verdict::kStored);
+  }
+  MotionSegment unknown = segments.front();
+  unknown.key = {"unknown", 0};
+  unknown.temperature_c.reset();
+  EXPECT_EQ(pipeline_->Submit("a", unknown, nullptr)->verdict,
+            SubmitResult::Verdict::kRejected);
+  ASSERT_TRUE(AllScored());
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  const auto version = store_->GetCalibration("a", 2);
+  ASSERT_TRUE(version.ok()) << version.status();
+  EXPECT_THAT(version->reasons, ::testing::IsEmpty());
+  EXPECT_EQ(version->state, CalibrationState::kActive);
+  ASSERT_TRUE(SameShape(version->theta, truth));
+  const Eigen::VectorXd error = BoxMinus(version->theta, truth);
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  const std::vector<int> slopes =
+      MatchComponents(TangentComponents(truth), {"*_slope*"});
+  ASSERT_EQ(slopes.size(), 11u);
+  for (const int i : slopes) {
+    const double sigma = std::sqrt(version->covariance(i, i));
+    EXPECT_LT(std::abs(error(i)), 4 * sigma) << i;
+    EXPECT_LT(sigma, 0.7 * prior(i)) << i;
+  }
 }
 
 TEST_F(CoreEstimatorsTest, ScoresAreTheSameAfterAStop) {

@@ -57,6 +57,7 @@ const kParts: Record<string, string> = {
   time_offset: 'time offset',
   line_delay: 'line delay',
   time_drift: 'drift of the clock',
+  q_AI: 'rotation of the accelerometer',
   q_CI: 'rotation to the IMU',
   p_CI: 'position to the IMU',
 };
@@ -64,13 +65,16 @@ const kParts: Record<string, string> = {
 // cam0.focal.x -> focal length of camera 0, x
 export function component(name: string): string {
   const [device, first, ...rest] = name.split('.');
-  const say = (part: string) => kParts[part] ?? part.replaceAll('_', ' ');
+  const say = (part: string): string =>
+    part.endsWith('_slope')
+      ? `${say(part.slice(0, -'_slope'.length))} per kelvin`
+      : (kParts[part] ?? part.replaceAll('_', ' '));
   const camera = /^cam(\d+)$/.exec(device);
   if (camera && first) {
     return [`${say(first)} of camera ${camera[1]}`, ...rest].join(', ');
   }
-  if (first === 'q_AI') {
-    return ['rotation of the accelerometer', ...rest].join(', ');
+  if (first === 'q_AI' || first === 'q_AI_slope') {
+    return [say(first), ...rest].join(', ');
   }
   if (device === 'imu' && rest.length > 0) {
     const [what, ...axis] = rest;
