@@ -9,10 +9,10 @@
 // Nothing of it is part of selfcal's packages and libraries, which are
 // Apache-2.0.
 //
-// Requirements: OpenVINS is built without changes, with `imu_model: "rpng"`, whose
-// matrices and frame are those of selfcal (the IMU's frame is the gyroscope's),
-// without `downsample_cameras`, and with cameras that take their images
-// together. The rig must have cameras of the models radial-tangential or
+// Requirements: OpenVINS is built without changes, with `imu_model: "rpng"`,
+// whose matrices and frame are those of selfcal (the IMU's frame is the
+// gyroscope's), without `downsample_cameras`, and with cameras that take their
+// images together. The rig must have cameras of the models radial-tangential or
 // equidistant and one time offset for all.
 //
 // Online calibration: With all calib_* switched off, the filter's calibration
