@@ -177,12 +177,20 @@ bool FeatureTracker::TransferWarp(const Camera& from,
   return true;
 }
 
+PatchPlane FeatureTracker::PlaneOf(const Camera& camera,
+                                   const Eigen::Vector2d& z_px,
+                                   double t_s) const {
+  auto q_0C = gyro_.OrientationAt(t_s + z_px.y() * camera.line_delay_s);
+  if (q_0C) *q_0C = drift_ * *q_0C * camera.theta.q_CI.conjugate();
+  return PlaneAt(camera.theta, z_px, q_0C);
+}
+
 bool FeatureTracker::Align(const cv::Mat& smooth,
-                           const CameraCalibration& camera,
+                           const Camera& camera,
+                           double t_s,
                            PatchWarp warp,
                            Point* point) const {
-  const LensCurvature curvature = CurvatureAt(camera, warp.z_px);
-  if (point->patch->Align(smooth, curvature, &warp) <
+  if (point->patch->Align(smooth, PlaneOf(camera, warp.z_px, t_s), &warp) <
       options_.min_correlation) {
     return false;
   }
@@ -192,7 +200,7 @@ bool FeatureTracker::Align(const cv::Mat& smooth,
   if ((stretch[0] > kMaxStretch || stretch[1] < 1 / kMaxStretch) &&
       IsInside(smooth, point->z_px, kPatchBorder_px)) {
     point->patch = std::make_shared<PatchTemplate>(
-        smooth, warp.z_px, CurvatureAt(camera, warp.z_px));
+        smooth, warp.z_px, PlaneOf(camera, warp.z_px, t_s));
     point->A.setIdentity();
   }
   return true;
@@ -231,7 +239,7 @@ void FeatureTracker::Follow(int camera, const cv::Mat& image, double t_s) {
         ++counts_.lost;
       } else if (options_.align) {
         warps[i].z_px = AsVector(found[i]);
-        kept[i] = Align(smooth, c.theta, warps[i], &c.points[i]);
+        kept[i] = Align(smooth, c, t_s, warps[i], &c.points[i]);
         if (!kept[i]) ++counts_.changed;
       }
     }
@@ -267,12 +275,22 @@ void FeatureTracker::CheckMotion(Camera* camera,
   options.seed = static_cast<std::uint64_t>(images_) + 1;
   const EpipolarFit fit =
       CheckEpipolar(pairs, gyro_.Between(camera->t_s, before_s), options);
+  if (camera == &cameras_.front()) CorrectDrift(before_s, fit.q_BA);
   for (std::size_t n = 0; n < index.size(); ++n) {
     kept[index[n]] = fit.inliers[n];
   }
   counts_.rejected +=
       static_cast<int>(std::count(kept.begin(), kept.end(), char{0}));
   Keep(kept, &camera->points);
+}
+
+void FeatureTracker::CorrectDrift(double before_s,
+                                  const Eigen::Quaterniond& q_now_before) {
+  const auto before = gyro_.OrientationAt(before_s);
+  const auto now = gyro_.OrientationAt(cameras_.front().t_s);
+  if (!before || !now) return;
+  drift_ = drift_ * *before * q_now_before.conjugate() * now->conjugate();
+  drift_.normalize();
 }
 
 void FeatureTracker::Replenish(int camera, const std::vector<char>& present) {
@@ -289,7 +307,7 @@ void FeatureTracker::Replenish(int camera, const std::vector<char>& present) {
     Point point{next_landmark_++, corner, nullptr};
     if (options_.align) {
       point.patch = std::make_shared<PatchTemplate>(
-          c.smooth, AsVector(corner), CurvatureAt(c.theta, AsVector(corner)));
+          c.smooth, AsVector(corner), PlaneOf(c, AsVector(corner), c.t_s));
     }
     c.points.push_back(std::move(point));
     ++counts_.begun;
@@ -359,7 +377,7 @@ void FeatureTracker::MatchNew(const Camera& from,
       match.z_px = found[n];
       if (options_.align) {
         warps[n].z_px = AsVector(found[n]);
-        if (!Align(to->smooth, to->theta, warps[n], &match)) continue;
+        if (!Align(to->smooth, *to, to->t_s, warps[n], &match)) continue;
       }
       still_open[index[n]] = 0;
       if (HasRoom(*to, match.z_px)) {

@@ -129,12 +129,17 @@ class FeatureTracker {
                     double to_s,
                     std::optional<double> distance_m,
                     PatchWarp* warp) const;
-  // Moves a point to where its patch is, from warp.z_px. False if it is not
-  // there.
+  // Moves a point to where its patch is in an image exposed at t_s, from
+  // warp.z_px. False if it is not there.
   bool Align(const cv::Mat& smooth,
-             const CameraCalibration& camera,
+             const Camera& camera,
+             double t_s,
              PatchWarp warp,
              Point* point) const;
+  // The plane of a pixel of an image that was exposed at t_s.
+  PatchPlane PlaneOf(const Camera& camera,
+                     const Eigen::Vector2d& z_px,
+                     double t_s) const;
 
   void Follow(int camera, const cv::Mat& image, double t_s);
   // Ends the points of a camera that do not agree with one motion; `before` has
@@ -142,6 +147,11 @@ class FeatureTracker {
   void CheckMotion(Camera* camera,
                    const std::vector<cv::Point2f>& before,
                    double before_s);
+  // Orientations are those of the gyroscope but for what the first camera
+  // shows: neither a bias nor a wrong rotation between camera and IMU adds up
+  // over a track. `q_now_before` is the rotation of the body since its last
+  // image.
+  void CorrectDrift(double before_s, const Eigen::Quaterniond& q_now_before);
   void Replenish(int camera, const std::vector<char>& present);
   // Points to look for in another camera: those from `first` on, which are new,
   // and some of the others.
@@ -159,6 +169,8 @@ class FeatureTracker {
 
   TrackerOptions options_;
   GyroRotation gyro_;
+  // Takes orientations of the gyroscope to those that the first camera shows.
+  Eigen::Quaterniond drift_ = Eigen::Quaterniond::Identity();
   std::vector<Camera> cameras_;
   cv::Size canvas_;  // that all images fit into
   int images_ = 0;

@@ -33,8 +33,8 @@ float GreyAt(const cv::Mat& image, float x, float y) {
 
 PatchTemplate::PatchTemplate(const cv::Mat& image,
                              const Eigen::Vector2d& z_px,
-                             const LensCurvature& curvature)
-    : curvature_(curvature) {
+                             const PatchPlane& plane)
+    : plane_(plane) {
   Eigen::Matrix<float, kPixels, kParameters> derivatives;
   int i = 0;
   for (int dy = -kReach_px; dy <= kReach_px; ++dy) {
@@ -95,11 +95,10 @@ bool PatchTemplate::Sample(const cv::Mat& image,
 }
 
 double PatchTemplate::Align(const cv::Mat& image,
-                            const LensCurvature& curvature,
+                            const PatchPlane& plane,
                             PatchWarp* warp) const {
   const auto sample = [&](const PatchWarp& w, Values* values) {
-    return Sample(
-        image, w, CurvatureOfWarp(curvature_, w.A, curvature), values);
+    return Sample(image, w, SecondOrderOfWarp(plane_, w.A, plane), values);
   };
   PatchWarp w = *warp;
   Values sampled;

@@ -1,9 +1,9 @@
 // The patch about a point as it was first seen, and where it is in another
 // image: an affine warp, a gain and an offset of the grey (inverse
-// compositional, Baker and Matthews 2004). What the lens bends beyond the
-// affine warp is known from its model: left out, it would move points towards
-// the middle of a wide-angle image by a hundredth of a pixel, and with them the
-// focal length.
+// compositional, Baker and Matthews 2004). What lens and perspective bend
+// beyond the affine warp is known (patch_plane.h): left out, the lens would
+// move points towards the middle of a wide-angle image by a hundredth of a
+// pixel, and with them the focal length.
 //
 // Tracks that are aligned to their first patch do not drift, as they would from
 // image to image, and a rotation of the camera does not move them. Immutable
@@ -14,12 +14,12 @@
 #include <array>
 #include <opencv2/core.hpp>
 
-#include "client/tracking/lens_curvature.h"
+#include "client/tracking/patch_plane.h"
 
 namespace selfcal::client {
 
 // Takes a point x of the patch, relative to its centre, to A x + z of the
-// image, but for the curvature of the lens.
+// image, to first order.
 struct PatchWarp {
   Eigen::Matrix2d A = Eigen::Matrix2d::Identity();
   Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
@@ -34,14 +34,14 @@ class PatchTemplate {
   // Requires the point to be kReach_px + 2 inside the image.
   PatchTemplate(const cv::Mat& image,
                 const Eigen::Vector2d& z_px,
-                const LensCurvature& curvature);
+                const PatchPlane& plane);
 
   // Aligns the patch to an image, from a warp that is wrong by about a pixel,
-  // to a place where the lens of that image has this curvature. Returns the
+  // to a place with this plane. Returns the
   // correlation of the greys of both, in [-1, 1], or 0 if the warp leaves the
   // image or does not converge; then *warp is unchanged.
   double Align(const cv::Mat& image,
-               const LensCurvature& curvature,
+               const PatchPlane& plane,
                PatchWarp* warp) const;
 
  private:
@@ -56,7 +56,7 @@ class PatchTemplate {
               const LensCurvature& bend,
               Values* values) const;
 
-  LensCurvature curvature_;
+  PatchPlane plane_;
   Values greys_;
   Values weights_;
   // Derivatives of the greys by the parameters, times the weights.

@@ -42,6 +42,12 @@ Eigen::Quaterniond GyroRotation::Between(double from_s, double to_s) const {
   return At(from_s).q.conjugate() * At(to_s).q;
 }
 
+std::optional<Eigen::Quaterniond> GyroRotation::OrientationAt(
+    double t_s) const {
+  if (nodes_.empty()) return std::nullopt;
+  return At(t_s).q;
+}
+
 Eigen::Vector3d GyroRotation::RateAt(double t_s) const {
   if (nodes_.empty()) return Eigen::Vector3d::Zero();
   return At(t_s).w_I;

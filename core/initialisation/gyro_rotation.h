@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <cstdint>
 #include <vector>
 
@@ -32,6 +33,9 @@ class GyroRotation {
   // IMU [s]. The rate is linear between samples, and beyond them that of the
   // nearest one. The identity without samples.
   Eigen::Quaterniond Between(double from_s, double to_s) const;
+
+  // R_0B, with 0 the body at the first sample; nullopt without samples.
+  std::optional<Eigen::Quaterniond> OrientationAt(double t_s) const;
 
   // Angular rate of the body [rad/s], in I.
   Eigen::Vector3d RateAt(double t_s) const;

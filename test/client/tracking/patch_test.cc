@@ -55,12 +55,12 @@ TEST(PatchTemplate, FindsTheAffineWarpOfItsSurroundings) {
     const cv::Mat second = Warped(A, t, gain);
     for (const Eigen::Vector2d& z :
          {Eigen::Vector2d(70, 80), {50.3, 90.7}, {85, 60}}) {
-      const PatchTemplate patch(first, z, LensCurvature::Zero());
+      const PatchTemplate patch(first, z, PatchPlane());
       PatchWarp warp;
       // A prediction that is wrong by a pixel and some degrees.
       warp.A << 1, -0.26, 0.24, 0.97;
       warp.z_px = A * z + t + Eigen::Vector2d(0.8, -0.6);
-      EXPECT_GT(patch.Align(second, LensCurvature::Zero(), &warp), 0.99);
+      EXPECT_GT(patch.Align(second, PatchPlane(), &warp), 0.99);
       EXPECT_LT((warp.z_px - (A * z + t)).norm(), 0.03);
       EXPECT_LT((warp.A - A).norm(), 0.03);
     }
@@ -75,8 +75,8 @@ TEST(PatchTemplate, DoesNotResembleAnotherTexture) {
     const Eigen::Vector2d z(30 + 2 * i, 130 - 2 * i);
     PatchWarp warp;
     warp.z_px = z;
-    const PatchTemplate patch(first, z, LensCurvature::Zero());
-    if (patch.Align(other, LensCurvature::Zero(), &warp) > 0.8) ++alike;
+    const PatchTemplate patch(first, z, PatchPlane());
+    if (patch.Align(other, PatchPlane(), &warp) > 0.8) ++alike;
   }
   // Eight parameters find some resemblance now and then.
   EXPECT_LE(alike, 3);
@@ -84,12 +84,12 @@ TEST(PatchTemplate, DoesNotResembleAnotherTexture) {
 
 TEST(PatchTemplate, ReportsPatchesThatLeaveTheImageAndKeepsTheirWarp) {
   const cv::Mat image = Warped(Eigen::Matrix2d::Identity(), {0, 0});
-  const PatchTemplate patch(image, {80, 80}, LensCurvature::Zero());
+  const PatchTemplate patch(image, {80, 80}, PatchPlane());
   for (const Eigen::Vector2d& z :
        {Eigen::Vector2d(7, 80), {80, 152.5}, {-1e9, 4}, {std::nan(""), 80}}) {
     PatchWarp warp;
     warp.z_px = z;
-    EXPECT_EQ(patch.Align(image, LensCurvature::Zero(), &warp), 0);
+    EXPECT_EQ(patch.Align(image, PatchPlane(), &warp), 0);
     EXPECT_EQ(warp.A, Eigen::Matrix2d::Identity());
   }
 }
