@@ -6,8 +6,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <optional>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/model/calibration.h"
