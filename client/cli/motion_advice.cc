@@ -24,7 +24,7 @@ std::string PercentText(double part) {
 
 using Missing = v1::AdviseMotionResponse::MissingDirection;
 
-// Whether segments of other temperatures would teach a direction.
+// Returns true if segments of other temperatures would teach a direction.
 bool IsOfTemperature(const Missing& missing) {
   const auto& parts = missing.parts();
   return std::any_of(parts.begin(), parts.end(), [](const auto& part) {

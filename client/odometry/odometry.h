@@ -40,7 +40,7 @@ struct OdometryOptions {
   // Landmarks with fewer keyframes in a segment are left out of it.
   int min_observations = 3;
   double max_gap_s = 0.6;  // between keyframes of one segment
-  // Of the device [deg C], if it is known: that of all segments.
+  // Temperature of the device [deg C] in all segments, if it is known.
   std::optional<double> temperature_c = std::nullopt;
 };
 
