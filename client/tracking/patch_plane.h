@@ -1,8 +1,8 @@
 // The plane on which a patch of an image is described: that across its ray, at
 // a unit distance from the camera, with the map from pixels to it.
 //
-// Between two images, the planes of a patch are related by the homography that
-// a flat surface and the motion of the camera induce. Its first order is the
+// The planes of a patch in two images are related by the homography that a flat
+// surface and the motion of the camera induce. Its first order is the
 // affine warp that the tracker estimates; its second order follows from that
 // warp, if the rotation between both images is known: the angle between the two
 // rays (the parallax) is then known, and the warp shows how the distance of the

@@ -107,7 +107,8 @@ int ImuTangentSize(const ImuCalibration& imu);
 // that of theta.
 int CameraTangentSize(const CameraCalibration& camera);
 int CameraTangentOffset(const Calibration& theta, int camera);
-// Whether the clock of any camera drifts (CameraCalibration::time_drift).
+// Returns true if the clock of any camera drifts
+// (CameraCalibration::time_drift).
 bool HasTimeDrift(const Calibration& theta);
 
 // Index of the time offset of camera j, which line delay and drift follow.

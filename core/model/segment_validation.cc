@@ -95,8 +95,8 @@ void CheckTemperature(const MotionSegment& segment,
                 "leave it out");
 }
 
-// Where the clocks are further apart than a constant offset may be, a session
-// has lasted too long.
+// A session has lasted too long where the clocks are further apart than a
+// constant offset may be.
 void CheckClocks(const Calibration& theta,
                  double session_s,
                  const SegmentLimits& limits,

@@ -38,7 +38,7 @@ void Move(const Eigen::VectorXd& by, Vector* v) {
   *v += by;
 }
 
-// Of a block without its slope.
+// The place of a block that may have a slope.
 struct Place {
   int offset;
   bool is_rotation;

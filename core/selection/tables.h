@@ -18,7 +18,7 @@ struct TableEntry {
   std::int64_t sequence = 0;
   double entropy = 0;  // [nat]
   double gain = 0;     // [nat]
-  // Of the device [deg C], if the segment states one.
+  // Temperature of the device [deg C], if the segment states one.
   std::optional<double> temperature_c = std::nullopt;
 
   friend bool operator==(const TableEntry&, const TableEntry&) = default;

@@ -43,7 +43,7 @@ struct Setting {
   Calibration truth;
   bool ignored = false;
   double apart_s = 0;  // from one segment to the next; 0: of one motion
-  // Of each segment [deg C]; empty: of one motion.
+  // Temperature of each segment [deg C]; empty: one motion, of none.
   std::vector<double> temperatures_c = {};
 };
 

@@ -21,7 +21,7 @@ struct View {
   Eigen::Quaterniond q;
   Eigen::Vector3d t;
 
-  // Where the second camera sees what the first one sees at a pixel.
+  // The pixel at which the second camera sees what the first one sees at z_px.
   std::optional<Eigen::Vector2d> Moved(const Eigen::Vector2d& z_px) const {
     Eigen::Vector3d ray;
     Eigen::Vector2d moved_px;

@@ -37,7 +37,7 @@ struct SessionKind {
   // If not zero, this much time passes from one of its four segments to the
   // next.
   double apart_s = 0;
-  // If not empty, the temperatures of its four segments [deg C].
+  // Temperatures of its four segments [deg C]; empty: they state none.
   std::vector<double> temperatures_c = {};
 };
 

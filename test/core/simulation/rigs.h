@@ -150,7 +150,8 @@ std::vector<MotionSegment> SimulateSingly(const Rig& rig,
   return segments;
 }
 
-// With this much time from one to the next since their sessions began.
+// Single segments with this much time from one to the next since their sessions
+// began.
 inline std::vector<MotionSegment> SimulateApart(
     const Rig& rig,
     const Calibration& truth,
@@ -163,7 +164,7 @@ inline std::vector<MotionSegment> SimulateApart(
       });
 }
 
-// At these temperatures.
+// Single segments at these temperatures.
 inline std::vector<MotionSegment> SimulateAtTemperatures(
     const Rig& rig,
     const Calibration& truth,
