@@ -13,6 +13,7 @@
 #include "core/model/camera_model.h"
 #include "core/model/imu.h"
 #include "core/model/rig.h"
+#include "core/model/temperature.h"
 
 namespace selfcal::c {
 
@@ -261,17 +262,14 @@ int32_t selfcal_calibration_at_temperature(
     auto status =
         selfcal::c::CheckAllNotNull({{calibration, "calibration"}, {at, "at"}});
     if (!status.ok()) return status;
-    const selfcal::client::CalibrationVersion version =
-        AtTemperature(calibration->published->version, temperature_c);
-    const auto violations = Validate(version.theta, "calibration");
-    if (!violations.empty()) {
-      return absl::InvalidArgumentError(
-          fmt::format("temperature_c: at {} deg C {} {}",
-                      temperature_c,
-                      violations.front().field,
-                      violations.front().message));
+    const auto& version = calibration->published->version;
+    const std::string fault =
+        selfcal::TemperatureFault(version.theta, temperature_c);
+    if (!fault.empty()) {
+      return absl::InvalidArgumentError("temperature_c: " + fault);
     }
-    *at = new selfcal_calibration{selfcal::c::Publish(version)};
+    *at = new selfcal_calibration{
+        selfcal::c::Publish(AtTemperature(version, temperature_c))};
     return status;
   });
 }

@@ -507,8 +507,8 @@ selfcal_calibration* selfcal_calibration_copy(
     const selfcal_calibration* calibration);
 // The calibration at a temperature [degrees Celsius]: without slopes, and with
 // the covariance of the values there. One without slopes is the same at every
-// temperature. SELFCAL_INVALID_ARGUMENT: so far from the temperatures of its
-// segments, the values would be impossible.
+// temperature. SELFCAL_INVALID_ARGUMENT: it is not the temperature of a device,
+// or the values there would be impossible.
 int32_t selfcal_calibration_at_temperature(
     const selfcal_calibration* calibration,
     double temperature_c,

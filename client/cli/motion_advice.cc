@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "client/text/text.h"
+#include "core/model/parameter_blocks.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 
@@ -28,7 +29,7 @@ using Missing = v1::AdviseMotionResponse::MissingDirection;
 bool IsOfTemperature(const Missing& missing) {
   const auto& parts = missing.parts();
   return std::any_of(parts.begin(), parts.end(), [](const auto& part) {
-    return part.component().find("_slope") != std::string::npos;
+    return part.component().find(kSlopeSuffix) != std::string::npos;
   });
 }
 
@@ -103,11 +104,7 @@ std::string MissingText(const v1::AdviseMotionResponse& response) {
   }
   const std::string slopes = DirectionLines(response, "", true);
   if (!slopes.empty()) {
-    text +=
-        "  segments of other temperatures teach this: record some that are 20 "
-        "K "
-        "or more apart:\n";
-    text += slopes;
+    text += "  record at temperatures 20 K or more apart for this:\n" + slopes;
   }
   if (const std::string rest = DirectionLines(response, ""); !rest.empty()) {
     text += "  no motion teaches this: hold it fixed, or state it better:\n";

@@ -46,7 +46,7 @@ struct Keyframe {
 };
 
 // theta at the temperature of the recording.
-Calibration Seen(const Calibration& theta, const OdometryOptions& options) {
+Calibration ThetaAt(const Calibration& theta, const OdometryOptions& options) {
   return AtTemperature(
       theta, options.temperature_c.value_or(theta.reference_temperature_c));
 }
@@ -64,7 +64,7 @@ class Odometry::Impl {
         options_(options),
         sets_(ImageSets(*recording)),
         step_(KeyframeStep(sets_, options.keyframe_rate_hz)),
-        tracker_(Seen(theta, options),
+        tracker_(ThetaAt(theta, options),
                  {.session_start_ns = SessionStart(sets_)}),
         index_(options.first_index) {
     if (options.after_ns) {
@@ -299,7 +299,7 @@ class Odometry::Impl {
                 const MotionSegment& tracks,
                 OdometrySegment* result) {
     const KeyframeState first = CarryOn(rig_,
-                                        Seen(theta, options_),
+                                        ThetaAt(theta, options_),
                                         before_->keyframes.back(),
                                         before_->imu,
                                         tracks.keyframes.front().t_ns);

@@ -22,9 +22,8 @@ CalibrationVersion AtTemperature(const CalibrationVersion& version,
   CalibrationVersion at = version;
   at.theta = selfcal::AtTemperature(version.theta, temperature_c);
   if (version.covariance.size() > 0) {
-    const Eigen::MatrixXd by_theta =
-        TemperatureDerivative(version.theta, temperature_c);
-    at.covariance = by_theta * version.covariance * by_theta.transpose();
+    at.covariance = CovarianceAtTemperature(
+        version.theta, version.covariance, temperature_c);
   }
   return at;
 }

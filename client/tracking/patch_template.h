@@ -37,9 +37,10 @@ class PatchTemplate {
                 const PatchPlane& plane);
 
   // Aligns the patch to an image, from a warp that is wrong by about a pixel,
-  // to a place with this plane. Returns the
-  // correlation of the greys of both, in [-1, 1], or 0 if the warp leaves the
-  // image or does not converge; then *warp is unchanged.
+  // to a place with this plane. Returns the correlation of the greys of both,
+  // in
+  // [-1, 1], or 0 if the warp leaves the image or does not converge; then *warp
+  // is unchanged.
   double Align(const cv::Mat& image,
                const PatchPlane& plane,
                PatchWarp* warp) const;

@@ -92,23 +92,27 @@ void SessionChain::AddLink(const SegmentEnds& segment) {
   // The temperature of the link is the mean of both segments.
   const double temperature_c =
       0.5 * (end_->temperature_c + segment.temperature_c);
+  const SegmentTheta theta_s(point_, temperature_c);
   InertialJacobians J;
   InertialMatrix covariance;
-  const InertialResidual residual =
-      EvaluateInertial(end_->tail,
-                       end_->state,
-                       segment.first,
-                       AtTemperature(point_, temperature_c).imu,
-                       rig_.imu_noise,
-                       rig_.gravity_mps2,
-                       &J,
-                       &covariance);
+  const InertialResidual residual = EvaluateInertial(end_->tail,
+                                                     end_->state,
+                                                     segment.first,
+                                                     theta_s->imu,
+                                                     rig_.imu_noise,
+                                                     rig_.gravity_mps2,
+                                                     &J,
+                                                     &covariance);
   const InertialMatrix W = SquareRootInformation(covariance);
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(kState, eta_.size());
-  const Eigen::MatrixXd by_theta =
-      J.theta *
-      TemperatureDerivative(point_, temperature_c).topRows(J.theta.cols());
-  for (const int i : FreeComponents(rig_)) rows.col(i) = by_theta.col(i);
+  Eigen::MatrixXd by_theta = J.theta;
+  if (theta_s.varies()) {
+    by_theta *=
+        TemperatureDerivative(point_, temperature_c).topRows(J.theta.cols());
+  }
+  for (const int i : FreeComponents(rig_)) {
+    if (i < by_theta.cols()) rows.col(i) = by_theta.col(i);
+  }
   rows.middleCols<kState>(theta_) = J.x0;
   rows.middleCols<kState>(theta_ + kState) = J.x1;
   rows = W * rows;

@@ -246,10 +246,9 @@ struct SlopeBlock : Block<Sensor> {
       of;
 };
 
-// Prior sigmas of the IMU are those of data sheets of low-cost parts (a change
-// of the sensitivity of 0.02 to 0.03 % per kelvin), of a camera those of a
-// plastic lens and mount (1e-4 of the focal length per kelvin). Reference
-// sigmas are those of the blocks, over 20 K.
+// Prior sigmas are assumptions: 0.03 % per kelvin of a scale, about 1e-4 of a
+// focal length, and 0.003 degrees between camera and IMU. Reference sigmas are
+// those of the blocks, over 20 K.
 inline constexpr SlopeBlock<ImuCalibration> kImuSlopes[] = {
     {{{.name = "gyro.scale_slope",
        .field = "s_g_slope",

@@ -10,7 +10,6 @@
 
 #include "core/model/calibration.h"
 #include "core/model/image_bounds.h"
-#include "core/model/rig.h"
 #include "core/model/segment.h"
 #include "core/model/temperature.h"
 #include "core/model/violation_list.h"
@@ -58,22 +57,8 @@ void CheckKey(const MotionSegment& segment, ViolationList* list) {
   }
 }
 
-// The calibration must be one at the temperature.
-void CheckSlopes(const Calibration& theta,
-                 double temperature_c,
-                 ViolationList* list) {
-  if (!HasSlopes(theta)) return;
-  const auto faults = Validate(AtTemperature(theta, temperature_c), "");
-  if (faults.empty()) return;
-  list->Add("temperature_c",
-            "is so far from the reference temperature that the slopes lead to "
-            "an impossible calibration: " +
-                faults.front().field + " " + faults.front().message);
-}
-
 void CheckTemperature(const MotionSegment& segment,
                       const Calibration& theta,
-                      const SegmentLimits& limits,
                       ViolationList* list) {
   if (!segment.temperature_c) {
     if (HasSlopes(theta)) {
@@ -83,16 +68,8 @@ void CheckTemperature(const MotionSegment& segment,
     }
     return;
   }
-  const double c = *segment.temperature_c;
-  // The comparison is false for NaN.
-  if (c >= limits.min_temperature_c && c <= limits.max_temperature_c) {
-    CheckSlopes(theta, c, list);
-    return;
-  }
-  list->Add("temperature_c",
-            std::to_string(c) +
-                " is not the temperature of a device; send degrees Celsius, or "
-                "leave it out");
+  std::string fault = TemperatureFault(theta, *segment.temperature_c);
+  if (!fault.empty()) list->Add("temperature_c", std::move(fault));
 }
 
 // A session has lasted too long where the clocks are further apart than a
@@ -407,7 +384,7 @@ std::vector<Violation> Validate(const MotionSegment& segment,
                                 const SegmentLimits& limits) {
   ViolationList list(limits.max_violations);
   CheckKey(segment, &list);
-  CheckTemperature(segment, theta, limits, &list);
+  CheckTemperature(segment, theta, &list);
   CheckSessionStart(segment, theta, limits, &list);
   const bool keyframes_counted = CheckCount("keyframes",
                                             segment.keyframes.size(),

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "core/model/parameter_blocks.h"
+#include "core/model/rig.h"
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -68,10 +69,36 @@ double TemperatureOf(const Calibration& theta, const MotionSegment& segment) {
 
 SegmentTheta::SegmentTheta(const Calibration& theta,
                            const MotionSegment& segment)
+    : SegmentTheta(theta, TemperatureOf(theta, segment)) {}
+
+SegmentTheta::SegmentTheta(const Calibration& theta, double temperature_c)
     : theta_(theta) {
-  if (HasSlopes(theta)) {
-    at_ = AtTemperature(theta, TemperatureOf(theta, segment));
+  if (HasSlopes(theta)) at_ = AtTemperature(theta, temperature_c);
+}
+
+Eigen::MatrixXd CovarianceAtTemperature(const Calibration& theta,
+                                        const Eigen::MatrixXd& covariance,
+                                        double temperature_c) {
+  if (!HasSlopes(theta)) return covariance;
+  const Eigen::MatrixXd derivative =
+      TemperatureDerivative(theta, temperature_c);
+  return derivative * covariance * derivative.transpose();
+}
+
+std::string TemperatureFault(const Calibration& theta, double temperature_c) {
+  const SegmentLimits limits;
+  // The comparison is false for NaN.
+  if (!(temperature_c >= limits.min_temperature_c &&
+        temperature_c <= limits.max_temperature_c)) {
+    return std::to_string(temperature_c) +
+           " is not the temperature of a device; send degrees Celsius";
   }
+  if (!HasSlopes(theta)) return "";
+  const auto faults = Validate(AtTemperature(theta, temperature_c), "");
+  if (faults.empty()) return "";
+  return "is so far from the reference temperature that the slopes lead to an "
+         "impossible calibration: " +
+         faults.front().field + " " + faults.front().message;
 }
 
 Eigen::MatrixXd TemperatureDerivative(const Calibration& theta,

@@ -12,6 +12,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
 
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
@@ -23,6 +24,15 @@ bool HasSlopes(const Calibration& theta);
 // theta at a temperature [deg C], without slopes; theta itself if it has none.
 Calibration AtTemperature(const Calibration& theta, double temperature_c);
 
+// Covariance of AtTemperature(theta), D0 x D0, from that of theta, D x D.
+Eigen::MatrixXd CovarianceAtTemperature(const Calibration& theta,
+                                        const Eigen::MatrixXd& covariance,
+                                        double temperature_c);
+
+// The reason why theta has no value at a temperature: it is not that of a
+// device, or the slopes lead to an impossible calibration. Empty if it has one.
+std::string TemperatureFault(const Calibration& theta, double temperature_c);
+
 // T_s: the temperature of a segment, or the reference if it states none.
 double TemperatureOf(const Calibration& theta, const MotionSegment& segment);
 
@@ -31,6 +41,7 @@ double TemperatureOf(const Calibration& theta, const MotionSegment& segment);
 class SegmentTheta {
  public:
   SegmentTheta(const Calibration& theta, const MotionSegment& segment);
+  SegmentTheta(const Calibration& theta, double temperature_c);
 
   bool varies() const { return at_.has_value(); }
   const Calibration& operator*() const { return at_ ? *at_ : theta_; }

@@ -68,7 +68,7 @@ struct Diagnosis {
 };
 
 // `segments` are of one rig; `theta` is the calibration that their SLAM system
-// used.
+// used, of which all are checked at the median of their temperatures.
 Diagnosis Diagnose(const Rig& rig,
                    const Calibration& theta,
                    std::span<const MotionSegment> segments);

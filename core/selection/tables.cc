@@ -31,31 +31,32 @@ int BinOf(const TableEntry& entry, double width_k) {
   return static_cast<int>(std::floor(*entry.temperature_c / width_k));
 }
 
-// The entry of a full table that a candidate competes with.
-const TableEntry& RivalOf(const TableEntry& candidate,
-                          const std::vector<TableEntry>& entries,
-                          double width_k,
-                          bool* yields) {
+// The entry of a full table that a candidate may replace: in any case, or only
+// if the candidate is better.
+struct Rival {
+  TableEntry entry;
+  bool yields;
+};
+
+Rival RivalOf(const TableEntry& candidate,
+              const std::vector<TableEntry>& entries,
+              double width_k) {
   std::map<int, int> counts;
   for (const TableEntry& entry : entries) ++counts[BinOf(entry, width_k)];
   const int own = BinOf(candidate, width_k);
   const int own_count = counts[own];
   const int share = std::max<int>(
       1, static_cast<int>(entries.size()) / static_cast<int>(counts.size()));
-  // The worst of those that meet a condition.
+  // The worst of those in bins that meet a condition.
   const auto worst = [&](const auto& meets) {
     return std::find_if(entries.rbegin(), entries.rend(), [&](const auto& e) {
       return meets(BinOf(e, width_k));
     });
   };
-  if (own_count < share) {
-    const auto found = worst([&](int bin) { return counts[bin] > share; });
-    *yields = found != entries.rend();
-    if (*yields) return *found;
-  }
-  *yields = false;
-  const auto found = worst([&](int bin) { return bin == own; });
-  return found != entries.rend() ? *found : entries.back();
+  const auto of_large = worst([&](int bin) { return counts[bin] > share; });
+  if (own_count < share && of_large != entries.rend()) return {*of_large, true};
+  const auto of_own = worst([&](int bin) { return bin == own; });
+  return {of_own != entries.rend() ? *of_own : entries.back(), false};
 }
 
 }  // namespace
@@ -112,15 +113,13 @@ TableUpdate Offer(const TableEntry& candidate,
     return change;
   }
   if (table->full()) {
-    bool yields = false;
-    const TableEntry rival =
-        RivalOf(candidate, entries, temperature_bin_k, &yields);
-    if (!yields && !Better(candidate, rival)) {
-      change.rival = rival;
+    const Rival rival = RivalOf(candidate, entries, temperature_bin_k);
+    if (!rival.yields && !Better(candidate, rival.entry)) {
+      change.rival = rival.entry;
       return change;
     }
-    std::erase(entries, rival);
-    change.evicted = rival;
+    std::erase(entries, rival.entry);
+    change.evicted = rival.entry;
   }
   entries.insert(
       std::upper_bound(entries.begin(), entries.end(), candidate, Better),

@@ -1,8 +1,6 @@
 #include <map>
 #include <set>
 
-#include "core/model/rig.h"
-#include "core/model/segment.h"
 #include "core/model/temperature.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.pb.h"
@@ -39,22 +37,10 @@ absl::StatusOr<v1::Calibration> EncodeAt(const ApiContext& context,
                                          const StoredCalibration& calibration,
                                          const std::string& name,
                                          double temperature_c) {
-  const SegmentLimits limits;
-  if (!(temperature_c >= limits.min_temperature_c &&
-        temperature_c <= limits.max_temperature_c)) {
-    return InvalidFields(
-        {{"temperature_c",
-          "is not the temperature of a device; send degrees Celsius"}});
-  }
+  const std::string fault = TemperatureFault(calibration.theta, temperature_c);
+  if (!fault.empty()) return InvalidFields({{"temperature_c", fault}});
   if (!HasSlopes(calibration.theta)) {
     return EncodeNamed(context, calibration, name);
-  }
-  const auto faults =
-      Validate(AtTemperature(calibration.theta, temperature_c), "");
-  if (!faults.empty()) {
-    return InvalidFields({{"temperature_c",
-                           "is too far from those of the segments: " +
-                               faults.front().field + " would be impossible"}});
   }
   auto rig = context.store->GetRig(calibration.rig);
   if (!rig.ok()) return About(rig.status(), {kCalibrationType, name, {}});

@@ -120,11 +120,9 @@ v1::Calibration Encode(const StoredCalibration& calibration,
 CalibrationAtTemperature AtTemperature(StoredCalibration calibration,
                                        StoredRig rig,
                                        double temperature_c) {
-  const Eigen::MatrixXd by_theta =
-      TemperatureDerivative(calibration.theta, temperature_c);
   Eigen::MatrixXd& Sigma = calibration.covariance;
-  if (Sigma.rows() == by_theta.cols()) {
-    Sigma = (by_theta * Sigma * by_theta.transpose()).eval();
+  if (Sigma.rows() == TangentSize(calibration.theta)) {
+    Sigma = CovarianceAtTemperature(calibration.theta, Sigma, temperature_c);
   }
   calibration.theta = AtTemperature(calibration.theta, temperature_c);
   rig.rig.factory = AtTemperature(rig.rig.factory, temperature_c);

@@ -260,12 +260,7 @@ def losses(calibration: v1.CalibrationParameters) -> list[str]:
                 "keep their own timestamps"
             )
         if any(
-            (
-                camera.q_ci_slope,
-                camera.p_ci_slope,
-                camera.f_slope,
-                camera.c_slope,
-            )
+            field.name.endswith("_slope") for field, _ in camera.ListFields()
         ):
             lost.append(
                 f"cam{number}: its slopes with temperature are not included; "

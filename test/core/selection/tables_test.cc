@@ -134,7 +134,7 @@ std::map<int, int> Bins(const Table& table) {
 TEST(Tables, KeepTemperaturesApartForRigsThatNeedThem) {
   Table table = MakeTable(8);
   int id = 0;
-  // Of one temperature, the best stay.
+  // The best stay while all have one temperature.
   for (; id < 20; ++id) {
     Offer(At(id, -id, 31), 1, &table, kTemperatureBin_k);
   }

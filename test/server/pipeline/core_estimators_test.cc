@@ -8,6 +8,24 @@ namespace {
 class CoreEstimatorsTest : public PipelineTest {
  protected:
   CoreEstimatorsTest() { estimators_ = CoreEstimators(); }
+
+  // Version 2 of the rig "a", which these segments make active.
+  StoredCalibration VersionFrom(const std::vector<MotionSegment>& segments) {
+    StartOne();
+    for (const MotionSegment& segment : segments) {
+      const auto result = pipeline_->Submit("a", segment, nullptr);
+      EXPECT_TRUE(result.ok()) << result.status();
+      EXPECT_EQ(result->verdict, SubmitResult::Verdict::kStored);
+    }
+    EXPECT_TRUE(AllScored());
+    EXPECT_TRUE(RunIs(RunState::kSucceeded));
+    const auto version = store_->GetCalibration("a", 2);
+    EXPECT_TRUE(version.ok()) << version.status();
+    if (!version.ok()) return {};
+    EXPECT_THAT(version->reasons, ::testing::IsEmpty());
+    EXPECT_EQ(version->state, CalibrationState::kActive);
+    return *version;
+  }
 };
 
 TEST_F(CoreEstimatorsTest, SimulatedSegmentsFillTheTablesAndGiveAVersion) {
@@ -52,29 +70,18 @@ TEST_F(CoreEstimatorsTest, OptionalBlocksOfANewRigAreEstimated) {
   ASSERT_TRUE(domain_->CreateRig(rig).ok());
   SimulationOptions options;
   options.seed = 3;
-  const auto segments =
+  const StoredCalibration version = VersionFrom(
       Simulate(rig, truth, rig.factory, *MakeHandheld(50, 1, 3), "s", options)
-          .segments;
-  StartOne();
-  for (const MotionSegment& segment : segments) {
-    ASSERT_TRUE(pipeline_->Submit("a", segment, nullptr).ok());
-  }
-  ASSERT_TRUE(AllScored());
-  ASSERT_TRUE(RunIs(RunState::kSucceeded));
-  const auto version = store_->GetCalibration("a", 2);
-  ASSERT_TRUE(version.ok()) << version.status();
-  EXPECT_THAT(version->reasons, ::testing::IsEmpty());
-  EXPECT_EQ(version->state, CalibrationState::kActive);
-  ASSERT_TRUE(SameShape(version->theta, truth));
-  const Eigen::VectorXd error = BoxMinus(version->theta, truth);
+          .segments);
+  ASSERT_TRUE(SameShape(version.theta, truth));
+  const Eigen::VectorXd error = BoxMinus(version.theta, truth);
   const std::vector<int> added = MatchComponents(
       TangentComponents(truth), {"*.line_delay", "imu.gyro.g_sensitivity.*"});
   ASSERT_EQ(added.size(), 10u);
   for (const int i : added) {
-    EXPECT_LT(std::abs(error(i)), 4 * std::sqrt(version->covariance(i, i)))
-        << i;
+    EXPECT_LT(std::abs(error(i)), 4 * std::sqrt(version.covariance(i, i))) << i;
   }
-  EXPECT_LT(std::sqrt(version->covariance(added.back(), added.back())), 1e-6);
+  EXPECT_LT(std::sqrt(version.covariance(added.back(), added.back())), 1e-6);
 }
 
 // A device that is used between 0 and 60 degrees, of whose slopes the rig knows
@@ -94,31 +101,21 @@ TEST_F(CoreEstimatorsTest, SlopesOfADeviceThatWarmsUpAreEstimated) {
   options.seed = 3;
   const std::vector<MotionSegment> segments = SimulateAtTemperatures(
       rig, truth, {0, 20, 40, 60, 0, 20, 40, 60, 0, 20, 40, 60}, options);
-  StartOne();
-  for (const MotionSegment& segment : segments) {
-    const auto result = pipeline_->Submit("a", segment, nullptr);
-    ASSERT_TRUE(result.ok()) << result.status();
-    ASSERT_EQ(result->verdict, SubmitResult::Verdict::kStored);
-  }
+  const StoredCalibration version = VersionFrom(segments);
   MotionSegment unknown = segments.front();
   unknown.key = {"unknown", 0};
   unknown.temperature_c.reset();
-  EXPECT_EQ(pipeline_->Submit("a", unknown, nullptr)->verdict,
-            SubmitResult::Verdict::kRejected);
-  ASSERT_TRUE(AllScored());
-  ASSERT_TRUE(RunIs(RunState::kSucceeded));
-  const auto version = store_->GetCalibration("a", 2);
-  ASSERT_TRUE(version.ok()) << version.status();
-  EXPECT_THAT(version->reasons, ::testing::IsEmpty());
-  EXPECT_EQ(version->state, CalibrationState::kActive);
-  ASSERT_TRUE(SameShape(version->theta, truth));
-  const Eigen::VectorXd error = BoxMinus(version->theta, truth);
+  const auto refused = pipeline_->Submit("a", unknown, nullptr);
+  ASSERT_TRUE(refused.ok()) << refused.status();
+  EXPECT_EQ(refused->verdict, SubmitResult::Verdict::kRejected);
+  ASSERT_TRUE(SameShape(version.theta, truth));
+  const Eigen::VectorXd error = BoxMinus(version.theta, truth);
   const Eigen::VectorXd prior = PriorSigmas(rig);
   const std::vector<int> slopes =
       MatchComponents(TangentComponents(truth), {"*_slope*"});
   ASSERT_EQ(slopes.size(), 11u);
   for (const int i : slopes) {
-    const double sigma = std::sqrt(version->covariance(i, i));
+    const double sigma = std::sqrt(version.covariance(i, i));
     EXPECT_LT(std::abs(error(i)), 4 * sigma) << i;
     EXPECT_LT(sigma, 0.7 * prior(i)) << i;
   }
