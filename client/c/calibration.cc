@@ -7,7 +7,9 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
+#include "client/c/block_values.h"
 #include "client/c/boundary.h"
 #include "core/model/camera.h"
 #include "core/model/camera_model.h"
@@ -184,6 +186,21 @@ absl::Status FromCamera(const selfcal_camera* given,
   return status;
 }
 
+// INVALID_ARGUMENT names a value that is not valid.
+absl::Status CheckValid(const Calibration& theta) {
+  const auto violations = Validate(theta, "calibration");
+  if (violations.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(fmt::format(
+      "{}: {}", violations.front().field, violations.front().message));
+}
+
+// A handle of values that no daemon has published.
+selfcal_calibration* Unpublished(Calibration theta) {
+  client::CalibrationVersion version;
+  version.theta = std::move(theta);
+  return new selfcal_calibration{Publish(version)};
+}
+
 absl::StatusOr<Calibration> ToCalibration(const selfcal_imu* imu,
                                           const selfcal_camera* const* cameras,
                                           std::int32_t count) {
@@ -199,11 +216,9 @@ absl::StatusOr<Calibration> ToCalibration(const selfcal_imu* imu,
     status = FromCamera(
         cameras[j], fmt::format("cameras[{}]", j), &theta.cameras[j]);
   }
+  if (status.ok()) status = CheckValid(theta);
   if (!status.ok()) return status;
-  const auto violations = Validate(theta, "calibration");
-  if (violations.empty()) return theta;
-  return absl::InvalidArgumentError(fmt::format(
-      "{}: {}", violations.front().field, violations.front().message));
+  return theta;
 }
 
 selfcal_component ToComponent(const PublishedVersion& published,
@@ -238,9 +253,28 @@ int32_t selfcal_calibration_create(const selfcal_imu* imu,
     if (!theta.ok()) return theta.status();
     auto status = RequireNotNull(calibration, "calibration");
     if (!status.ok()) return status;
-    selfcal::client::CalibrationVersion version;
-    version.theta = *theta;
-    *calibration = new selfcal_calibration{selfcal::c::Publish(version)};
+    *calibration = selfcal::c::Unpublished(*theta);
+    return status;
+  });
+}
+
+int32_t selfcal_calibration_with_block(const selfcal_calibration* calibration,
+                                       const char* name,
+                                       const double* values,
+                                       uint64_t size,
+                                       selfcal_calibration** with,
+                                       selfcal_error* error) {
+  if (with != nullptr) *with = nullptr;
+  return Guarded(error, [&] {
+    auto status = selfcal::c::CheckAllNotNull(
+        {{calibration, "calibration"}, {name, "name"}, {with, "with"}});
+    if (status.ok() && size > 0) status = RequireNotNull(values, "values");
+    if (!status.ok()) return status;
+    selfcal::Calibration theta = selfcal::c::ThetaOf(calibration);
+    status = selfcal::c::SetBlock(name, {values, size}, &theta);
+    if (status.ok()) status = selfcal::c::CheckValid(theta);
+    if (!status.ok()) return status;
+    *with = selfcal::c::Unpublished(std::move(theta));
     return status;
   });
 }
@@ -379,12 +413,28 @@ int32_t selfcal_calibration_correct_imu(const selfcal_calibration* calibration,
                                         double w_I[3],
                                         double f_I[3],
                                         selfcal_error* error) {
+  constexpr double kConstantRate[3] = {0, 0, 0};
+  return selfcal_calibration_correct_imu_dw(
+      calibration, gyro, accel, b_g, b_a, kConstantRate, w_I, f_I, error);
+}
+
+int32_t selfcal_calibration_correct_imu_dw(
+    const selfcal_calibration* calibration,
+    const double gyro[3],
+    const double accel[3],
+    const double b_g[3],
+    const double b_a[3],
+    const double dw_I[3],
+    double w_I[3],
+    double f_I[3],
+    selfcal_error* error) {
   return Guarded(error, [&] {
     auto status = selfcal::c::CheckAllNotNull({{calibration, "calibration"},
                                                {gyro, "gyro"},
                                                {accel, "accel"},
                                                {b_g, "b_g"},
                                                {b_a, "b_a"},
+                                               {dw_I, "dw_I"},
                                                {w_I, "w_I"},
                                                {f_I, "f_I"}});
     if (!status.ok()) return status;
@@ -393,7 +443,8 @@ int32_t selfcal_calibration_correct_imu(const selfcal_calibration* calibration,
                             Eigen::Vector3d(gyro),
                             Eigen::Vector3d(accel),
                             Eigen::Vector3d(b_g),
-                            Eigen::Vector3d(b_a));
+                            Eigen::Vector3d(b_a),
+                            Eigen::Vector3d(dw_I));
     selfcal::c::Copy(rates.w_I, w_I);
     selfcal::c::Copy(rates.f_I, f_I);
     return absl::OkStatus();

@@ -501,6 +501,18 @@ int32_t selfcal_calibration_create(const selfcal_imu* imu,
                                    int32_t count,
                                    selfcal_calibration** calibration,
                                    selfcal_error* error);
+// The same calibration with other values of one parameter block, with version 0
+// and without covariance: for blocks that the structs have no member for.
+// docs/concepts.md lists them: "imu.gyro.g_sensitivity", "cam0.focal_slope".
+// The values are in the order of the components, of a rotation w, x, y, z; with
+// size 0, the calibration has no such block. SELFCAL_INVALID_ARGUMENT: the
+// block is not known or has another number of values, or a value is not valid.
+int32_t selfcal_calibration_with_block(const selfcal_calibration* calibration,
+                                       const char* name,
+                                       const double* values,
+                                       uint64_t size,
+                                       selfcal_calibration** with,
+                                       selfcal_error* error);
 // A second owner of the same calibration, e.g. to keep what a callback was
 // given; NULL for NULL, or if there is no memory.
 selfcal_calibration* selfcal_calibration_copy(
@@ -564,6 +576,19 @@ int32_t selfcal_calibration_correct_imu(const selfcal_calibration* calibration,
                                         double w_I[3],
                                         double f_I[3],
                                         selfcal_error* error);
+// The same at the angular acceleration dw_I [rad/s^2], e.g. the difference of
+// w_I between samples. With the accelerometer 1 cm from the origin, 10 rad/s^2
+// matter by 0.1 m/s^2.
+int32_t selfcal_calibration_correct_imu_dw(
+    const selfcal_calibration* calibration,
+    const double gyro[3],
+    const double accel[3],
+    const double b_g[3],
+    const double b_a[3],
+    const double dw_I[3],
+    double w_I[3],
+    double f_I[3],
+    selfcal_error* error);
 // For a filter that exchanges its calibration while it runs: changes its biases
 // b_g [rad/s, in I] and b_a [m/s^2, in A] so that readings at rest mean under
 // `to` what they have meant under `from`, where f_I is the specific force at

@@ -139,6 +139,22 @@ class Calibration {
     handle_.reset(made, &selfcal_calibration_destroy);
   }
 
+  // With other values of one parameter block, e.g. "imu.gyro.g_sensitivity"
+  // (selfcal_calibration_with_block).
+  Calibration WithBlock(const std::string& name,
+                        const std::vector<double>& values) const {
+    selfcal_calibration* with = nullptr;
+    selfcal_error error;
+    internal::Check(selfcal_calibration_with_block(handle_.get(),
+                                                   name.c_str(),
+                                                   values.data(),
+                                                   values.size(),
+                                                   &with,
+                                                   &error),
+                    error);
+    return Calibration(with);
+  }
+
   explicit operator bool() const { return handle_ != nullptr; }
   const selfcal_calibration* get() const { return handle_.get(); }
   std::int64_t version() const {
@@ -223,6 +239,20 @@ class Calibration {
     internal::Check(selfcal_calibration_correct_imu(
                         handle_.get(), gyro, accel, b_g, b_a, w_I, f_I, &error),
                     error);
+  }
+  // The same at an angular acceleration (selfcal_calibration_correct_imu_dw).
+  void CorrectImu(const double (&gyro)[3],
+                  const double (&accel)[3],
+                  const double (&b_g)[3],
+                  const double (&b_a)[3],
+                  const double (&dw_I)[3],
+                  double (&w_I)[3],
+                  double (&f_I)[3]) const {
+    selfcal_error error;
+    internal::Check(
+        selfcal_calibration_correct_imu_dw(
+            handle_.get(), gyro, accel, b_g, b_a, dw_I, w_I, f_I, &error),
+        error);
   }
 
   // Changes the biases of a filter that takes this calibration instead of

@@ -175,8 +175,7 @@ void AddRestOfRig(const Rig& rig,
     losses->push_back(
         {"imu",
          "camera_info has no IMU: correct its readings by CorrectImu with this "
-         "calibration (scales, misalignments and q_AI removed, both in frame "
-         "I)",
+         "calibration, both in frame I",
          true});
   }
   AddTimeOffsetLosses(kTool, theta, losses);

@@ -184,6 +184,10 @@ ExportedFiles ExportKalibr(const Rig& rig,
       RowsText(body.matrices.G_f * gyro.R.transpose(), "  "),
       RowsText(gyro.R, "  "));
   AddMatricesLoss(theta.imu, &result.losses);
+  AddImuBlockLosses("kalibr",
+                    {"gyro.g_sensitivity", "accel.position"},
+                    theta.imu,
+                    &result.losses);
   AddGravityLoss("kalibr", rig, &result.losses);
   result.files = {{"camchain-imucam.yaml", chain}, {"imu.yaml", imu}};
   return result;

@@ -1,16 +1,54 @@
 #include "client/formats/losses.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <span>
+#include <type_traits>
 
 #include "client/formats/tool_models.h"
+#include "core/model/parameter_blocks.h"
 
 namespace selfcal::client {
 
-bool IsNominal(const ImuCalibration& imu) {
-  const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
-  return imu.T_g() == one && imu.T_a() == one && imu.q_AI.vec().isZero(0) &&
-         imu.gyro_g_sensitivity.isZero(0) && imu.accel_position.isZero(0);
+namespace {
+
+// Of every tool that corrects readings.
+constexpr std::string_view kMatrixBlocks[] = {"gyro.scale",
+                                              "gyro.misalignment",
+                                              "accel.scale",
+                                              "accel.misalignment",
+                                              "q_AI"};
+
+// The names of the blocks that correct readings.
+std::vector<std::string_view> Corrections(const ImuCalibration& imu) {
+  std::vector<std::string_view> names;
+  const ImuCalibration nominal;
+  const auto visit = [&]<class Value>(const BlockInfo& info,
+                                      const Value& value,
+                                      const Value& without) {
+    bool corrects;
+    if constexpr (std::is_same_v<Value, OptionalVector>) {
+      corrects = !value.isZero(0);  // absent ones are
+    } else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
+      corrects = !value.vec().isZero(0);
+    } else {
+      corrects = value != without;
+    }
+    if (corrects) names.push_back(info.name);
+  };
+  VisitSensorBlocks(kImuBlocks, visit, imu, nominal);
+  return names;
 }
+
+bool Contains(std::span<const std::string_view> names, std::string_view name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+}  // namespace
+
+bool IsNominal(const ImuCalibration& imu) { return Corrections(imu).empty(); }
 
 void AddImuLoss(const std::string& tool,
                 const ImuCalibration& imu,
@@ -19,34 +57,23 @@ void AddImuLoss(const std::string& tool,
   losses->push_back(
       {"imu",
        fmt::format("{} uses the readings as they are: give it those that "
-                   "CorrectImu computes with this calibration (scales, "
-                   "misalignments, q_AI, g-sensitivity and the position of the "
-                   "accelerometer removed, both in frame I)",
-                   tool),
+                   "CorrectImu computes with this calibration, both in frame "
+                   "I (corrected: {})",
+                   tool,
+                   fmt::join(Corrections(imu), ", ")),
        true});
 }
 
-void AddGSensitivityLoss(const std::string& tool,
-                         const ImuCalibration& imu,
-                         std::vector<Loss>* losses) {
-  if (imu.gyro_g_sensitivity.isZero(0)) return;
-  losses->push_back({"imu.gyro.g_sensitivity",
-                     fmt::format("{} has no sensitivity of the gyroscope to "
-                                 "acceleration: omitted",
-                                 tool),
-                     true});
-}
-
-void AddPositionLoss(const std::string& tool,
-                     const ImuCalibration& imu,
-                     std::vector<Loss>* losses) {
-  if (imu.accel_position.isZero(0)) return;
-  losses->push_back(
-      {"imu.accel.position",
-       fmt::format("{} has the accelerometer at the origin of the "
-                   "IMU: omitted",
-                   tool),
-       true});
+void AddImuBlockLosses(const std::string& tool,
+                       std::initializer_list<std::string_view> has,
+                       const ImuCalibration& imu,
+                       std::vector<Loss>* losses) {
+  for (const std::string_view name : Corrections(imu)) {
+    if (Contains(kMatrixBlocks, name) || Contains(has, name)) continue;
+    losses->push_back({fmt::format("imu.{}", name),
+                       fmt::format("{} has no such correction: omitted", tool),
+                       true});
+  }
 }
 
 void AddTimeOffsetLosses(const std::string& tool,

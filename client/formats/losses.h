@@ -2,6 +2,7 @@
 // losses what a tool of the stated kind cannot express.
 #pragma once
 
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,14 +19,13 @@ void AddImuLoss(const std::string& tool,
                 const ImuCalibration& imu,
                 std::vector<Loss>* losses);
 
-// A tool that corrects readings, but not by these blocks: a loss unless they
-// are absent or zero.
-void AddGSensitivityLoss(const std::string& tool,
-                         const ImuCalibration& imu,
-                         std::vector<Loss>* losses);
-void AddPositionLoss(const std::string& tool,
-                     const ImuCalibration& imu,
-                     std::vector<Loss>* losses);
+// For tools that correct readings by scales, misalignments, q_AI and the blocks
+// in `has`, named as in parameter_blocks.h ("gyro.g_sensitivity"): a loss for
+// each other block that corrects readings.
+void AddImuBlockLosses(const std::string& tool,
+                       std::initializer_list<std::string_view> has,
+                       const ImuCalibration& imu,
+                       std::vector<Loss>* losses);
 
 // For tools without time offsets.
 void AddTimeOffsetLosses(const std::string& tool,

@@ -126,7 +126,8 @@ ExportedFiles ExportOpenVins(const Rig& rig,
       RowsText(theta.imu.T_a(), "    "),
       RowsText(theta.imu.q_AI.normalized().toRotationMatrix(), "    "),
       RowsText(theta.imu.T_s(), "    "));
-  AddPositionLoss("openvins", theta.imu, &result.losses);
+  AddImuBlockLosses(
+      "openvins", {"gyro.g_sensitivity"}, theta.imu, &result.losses);
   AddSharedOffsetLosses("openvins", theta, &result.losses);
   AddLineDelayLosses("openvins", theta, &result.losses);
   AddTimeDriftLosses("openvins", theta, &result.losses);

@@ -232,6 +232,27 @@ def observations(segment: segment_pb2.MotionSegment) -> Iterator[Timed]:
         )
 
 
+# The values of an IMU whose readings need no correction, but for zeros.
+_ONE = v1.Vector3(x=1, y=1, z=1)
+_NOMINAL = v1.ImuCalibration(s_g=_ONE, s_a=_ONE)
+
+
+def _corrections(imu: v1.ImuCalibration) -> list[str]:
+    """Returns the names of the values that correct readings, but for q_ai,
+    which is the pose of frame A."""
+    names = []
+    for field, value in imu.ListFields():
+        if field.name == "q_ai":
+            continue
+        if field.message_type is not None:
+            corrects = value != getattr(_NOMINAL, field.name)
+        else:
+            corrects = any(value if isinstance(value, Iterable) else [value])
+        if corrects:
+            names.append(field.name)
+    return names
+
+
 def losses(calibration: v1.CalibrationParameters) -> list[str]:
     lost = []
     for number, camera in enumerate(calibration.cameras):
@@ -266,25 +287,11 @@ def losses(calibration: v1.CalibrationParameters) -> list[str]:
                 f"cam{number}: its slopes with temperature are not included; "
                 "the values are those at the reference temperature"
             )
-    scales = calibration.imu
-    if any(
-        value != nominal
-        for vector, nominal in (
-            (scales.s_g, 1), (scales.s_a, 1), (scales.m_g, 0), (scales.m_a, 0)
-        )
-        for value in (vector.x, vector.y, vector.z)
-    ):  # fmt: skip
+    corrected = _corrections(calibration.imu)
+    if corrected:
         lost.append(
-            "imu: scales and misalignments are not included; readings are raw"
-        )
-    if any(scales.gyro_g_sensitivity):
-        lost.append(
-            "imu: the sensitivity of the gyroscope to acceleration is not "
-            "included; readings are raw"
-        )
-    if any(scales.accel_position):
-        lost.append(
-            "imu: the position of the accelerometer is not included; its "
-            "readings are those of its own place"
+            f"imu: {', '.join(corrected)} "
+            f"{'is' if len(corrected) == 1 else 'are'} not included; readings "
+            "are raw"
         )
     return lost

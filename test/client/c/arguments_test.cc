@@ -133,8 +133,10 @@ TEST_F(ArgumentsTest, NullIsAnErrorOfEachFunctionThatHasErrors) {
       selfcal_calibration_get_component(nullptr, 0, &component, e),
       selfcal_calibration_get_covariance(nullptr, v, 1, e),
       selfcal_calibration_correct_imu(nullptr, v, v, v, v, v, v, e),
+      selfcal_calibration_correct_imu_dw(nullptr, v, v, v, v, v, v, v, e),
       selfcal_calibration_carry_biases(nullptr, nullptr, v, v, v, e),
       selfcal_calibration_at_temperature(nullptr, 0, &at, e),
+      selfcal_calibration_with_block(nullptr, "imu.q_AI", v, 4, &at, e),
       selfcal_calibration_project(nullptr, 0, v, v, e),
       selfcal_calibration_unproject(nullptr, 0, v, v, e),
   };

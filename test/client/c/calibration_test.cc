@@ -301,6 +301,98 @@ TEST_F(CalibrationTest, AppliesItselfAsTheLibraryDoes) {
             SELFCAL_OUT_OF_RANGE);
 }
 
+// A block is set by its name, and used.
+TEST_F(CalibrationTest, TakesAnyBlockByItsName) {
+  Receive(Message(1, true));
+  const double positions[3] = {0.03, -0.02, 0.01};
+  selfcal_calibration* with = nullptr;
+  ASSERT_EQ(
+      selfcal_calibration_with_block(
+          calibration_, "imu.accel.position", positions, 3, &with, &error_),
+      0)
+      << error_.message;
+  EXPECT_EQ(selfcal_calibration_version(with), 0);
+  EXPECT_EQ(selfcal_calibration_component_count(with),
+            TangentSize(Theta()) + 3);
+  Calibration theta = Theta();
+  theta.imu.accel_position = Eigen::Vector3d(positions);
+  const double gyro[3] = {1, -2, 3};
+  const double accel[3] = {1, 2, 9};
+  const double none[3] = {};
+  const double dw_I[3] = {5, -6, 7};
+  double w_I[3];
+  double f_I[3];
+  ASSERT_EQ(selfcal_calibration_correct_imu_dw(
+                with, gyro, accel, none, none, dw_I, w_I, f_I, &error_),
+            0);
+  const BodyRates rates = CorrectImu(theta.imu,
+                                     Eigen::Vector3d(gyro),
+                                     Eigen::Vector3d(accel),
+                                     Eigen::Vector3d::Zero(),
+                                     Eigen::Vector3d::Zero(),
+                                     Eigen::Vector3d(dw_I));
+  EXPECT_EQ(Eigen::Vector3d(w_I), rates.w_I);
+  EXPECT_EQ(Eigen::Vector3d(f_I), rates.f_I);
+
+  selfcal_calibration* without = nullptr;
+  ASSERT_EQ(selfcal_calibration_with_block(
+                with, "imu.accel.position", nullptr, 0, &without, &error_),
+            0);
+  EXPECT_EQ(selfcal_calibration_component_count(without), TangentSize(Theta()));
+  selfcal_calibration_destroy(without);
+  selfcal_calibration_destroy(with);
+}
+
+TEST_F(CalibrationTest, TakesEachKindOfBlock) {
+  Receive(Message(1, true));
+  const auto read = [&](const char* name, std::vector<double> values) {
+    selfcal_calibration* with = nullptr;
+    selfcal_camera camera = {};
+    camera.struct_size = sizeof(camera);
+    EXPECT_EQ(
+        selfcal_calibration_with_block(
+            calibration_, name, values.data(), values.size(), &with, &error_),
+        0)
+        << error_.message;
+    EXPECT_EQ(selfcal_calibration_get_camera(with, 1, &camera, &error_), 0);
+    selfcal_calibration_destroy(with);
+    return camera;
+  };
+  EXPECT_EQ(read("cam1.focal", {501, 502}).f[1], 502);
+  EXPECT_EQ(read("cam1.q_CI", {0, 1, 0, 0}).q_CI.x, 1);
+  EXPECT_EQ(read("cam1.distortion", {0.1, 0.2, 0, 0.01}).distortion[3], 0.01);
+  EXPECT_EQ(read("cam1.time_offset", {0.01}).time_offset_s, 0.01);
+  EXPECT_EQ(read("cam1.line_delay", {2e-5}).line_delay_s, 2e-5);
+  EXPECT_EQ(read("cam1.line_delay", {}).rolling_shutter, 0);
+}
+
+TEST_F(CalibrationTest, RefusesBlocksThatDoNotFit) {
+  Receive(Message(1, true));
+  const auto error = [&](const char* name, std::vector<double> values) {
+    selfcal_calibration* with = calibration_;
+    EXPECT_EQ(
+        selfcal_calibration_with_block(
+            calibration_, name, values.data(), values.size(), &with, &error_),
+        SELFCAL_INVALID_ARGUMENT);
+    EXPECT_EQ(with, nullptr);
+    return std::string(error_.message);
+  };
+  EXPECT_EQ(error("imu.colour", {1}), "name: there is no block 'imu.colour'");
+  EXPECT_EQ(error("cam2.focal", {500, 500}),
+            "name: there is no block 'cam2.focal'");
+  EXPECT_EQ(error("cam1.focal", {500}),
+            "size: cam1.focal does not have 1 values");
+  EXPECT_EQ(error("imu.gyro.scale", {}),
+            "size: imu.gyro.scale does not have 0 values");
+  EXPECT_EQ(error("imu.accel.position", {1, 2, 3, 4}),
+            "size: imu.accel.position does not have 4 values");
+  EXPECT_THAT(error("cam1.focal", {500, -1}),
+              ::testing::HasSubstr("calibration.cameras[1].f"));
+  EXPECT_EQ(selfcal_calibration_with_block(
+                calibration_, "cam1.focal", nullptr, 2, nullptr, &error_),
+            SELFCAL_INVALID_ARGUMENT);
+}
+
 TEST_F(CalibrationTest, CanBeMadeOfTheSameValues) {
   Receive(Message(1, true));
   selfcal_imu imu = {};

@@ -1,0 +1,66 @@
+#include "client/c/block_values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <type_traits>
+
+#include "core/model/parameter_blocks.h"
+
+namespace selfcal::c {
+namespace {
+
+// Sets the value; returns whether it has this number of components.
+template <class Value>
+bool Set(const BlockInfo& info, std::span<const double> from, Value* value) {
+  if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
+    if (from.size() != 4) return false;
+    *value = Eigen::Quaterniond(from[0], from[1], from[2], from[3]);
+  } else if constexpr (std::is_same_v<Value, double>) {
+    if (from.size() != 1) return false;
+    *value = from[0];
+  } else if constexpr (std::is_same_v<Value, std::optional<double>>) {
+    if (from.size() > 1) return false;
+    value->reset();
+    if (!from.empty()) *value = from[0];
+  } else {
+    const auto size = static_cast<int>(from.size());
+    bool fits = size == value->size();
+    if constexpr (std::is_same_v<Value, OptionalVector>) {
+      fits = size == 0 || std::ranges::count(info.sizes, size) > 0;
+    }
+    if (!fits) return false;
+    *value = Eigen::Map<const Eigen::VectorXd>(from.data(), size);
+  }
+  return true;
+}
+
+}  // namespace
+
+absl::Status SetBlock(const std::string& name,
+                      std::span<const double> values,
+                      Calibration* theta) {
+  bool known = false;
+  bool fits = false;
+  const auto set_of = [&](const std::string& sensor) {
+    return [&, sensor](const BlockInfo& info, auto& value) {
+      if (known || name != fmt::format("{}.{}", sensor, info.name)) return;
+      known = true;
+      fits = Set(info, values, &value);
+    };
+  };
+  VisitWithSlopes(set_of("imu"), theta->imu);
+  for (std::size_t j = 0; j < theta->cameras.size(); ++j) {
+    VisitWithSlopes(set_of(fmt::format("cam{}", j)), theta->cameras[j]);
+  }
+  if (!known) {
+    return absl::InvalidArgumentError(
+        fmt::format("name: there is no block '{}'", name));
+  }
+  if (fits) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      fmt::format("size: {} does not have {} values", name, values.size()));
+}
+
+}  // namespace selfcal::c
