@@ -14,6 +14,7 @@
 
 #include "client/cli/calibration_results.h"
 #include "client/cli/choice.h"
+#include "client/cli/clock_alignment.h"
 #include "client/cli/commands.h"
 #include "client/cli/device_data.h"
 #include "client/cli/diagnosis_text.h"
@@ -89,8 +90,7 @@ DistortionModel ModelNamed(const std::string& name) {
 
 // Replaces the calibration of the rig by a start that the first recording
 // gives.
-int MoveToStart(const std::vector<RecordedSession>& sessions,
-                RecordedRig* recorded) {
+int MoveToStart(RecordedSession* first, RecordedRig* recorded) {
   Rig known;
   const auto faults = FromProto(recorded->rig, "rig", &known);
   if (!faults.empty()) return kDone;  // the daemon lists them
@@ -98,9 +98,17 @@ int MoveToStart(const std::vector<RecordedSession>& sessions,
   AddEstimatedBlocks(known.blocks, &known.factory);
   known.groups = DefaultGroups(known.blocks, known.factory);
   Progress progress("start");
+  progress.Say("comparing the clocks of images and readings");
+  const absl::Status aligned = AlignClocks(first->name,
+                                           known.factory,
+                                           recorded->unknown.front(),
+                                           first->recording.get());
+  progress.Clear();
+  if (!aligned.ok()) return FailInput(aligned);
+  first->clocks_agree = true;
   progress.Say("calibrating on the first 40 s");
   const auto start =
-      FindStart(sessions.front().recording.get(), known, recorded->unknown);
+      FindStart(first->recording.get(), known, recorded->unknown);
   progress.Clear();
   if (start.ok()) {
     *recorded->rig.mutable_factory() = ToProto(start->theta);
@@ -122,7 +130,7 @@ int MoveToStart(const std::vector<RecordedSession>& sessions,
 // state has it already.
 int EnsureRig(Context* context,
               const CalibrateInput& input,
-              const std::vector<RecordedSession>& sessions) {
+              RecordedSession* first) {
   v1::Rig existing;
   grpc::Status status = ReadDevice(context, *input.rig.id, &existing);
   if (status.ok()) return kDone;
@@ -133,11 +141,11 @@ int EnsureRig(Context* context,
   auto recorded = ReadRecordedRig(input.rig,
                                   input.from,
                                   ModelNamed(input.camera_model),
-                                  sessions.front().recording.get(),
+                                  first->recording.get(),
                                   &losses);
   PrintLosses(losses);
   if (!recorded.ok()) return FailInput(recorded.status());
-  if (const int code = MoveToStart(sessions, &*recorded); code != kDone) {
+  if (const int code = MoveToStart(first, &*recorded); code != kDone) {
     return code;
   }
   using RigService = v1::RigService::StubInterface;
@@ -204,9 +212,8 @@ int WriteWhatToRecord(Context* context,
 int FeedAndCalibrate(Context* context,
                      const CalibrateInput& input,
                      std::vector<RecordedSession>* sessions) {
-  if (const int code = EnsureRig(context, input, *sessions); code != kDone) {
-    return code;
-  }
+  const int ensured = EnsureRig(context, input, &sessions->front());
+  if (ensured != kDone) return ensured;
   FeedCounts counts;
   for (RecordedSession& session : *sessions) {
     const int code =
@@ -214,7 +221,8 @@ int FeedAndCalibrate(Context* context,
                       {.rig = *input.rig.id,
                        .session = session.name,
                        .keyframes = input.recordings.keyframes,
-                       .keyframe_rate_hz = input.recordings.keyframe_rate_hz},
+                       .keyframe_rate_hz = input.recordings.keyframe_rate_hz,
+                       .clocks_agree = session.clocks_agree},
                       session.recording.get(),
                       &counts);
     if (code != kDone) return code;

@@ -73,7 +73,7 @@ absl::StatusOr<std::vector<RecordedSession>> OpenSessions(
         "{}-{}",
         NameOf(path),
         (*recording)->cameras().front().image_times_ns.front() / 1'000'000);
-    sessions.push_back({name, *std::move(recording)});
+    sessions.push_back({name, *std::move(recording), false});
     const std::size_t cameras = sessions.back().recording->cameras().size();
     const std::size_t first = sessions.front().recording->cameras().size();
     if (cameras != first) {

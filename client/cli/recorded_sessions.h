@@ -22,6 +22,7 @@ struct RecordingsInput {
 struct RecordedSession {
   std::string name;
   std::unique_ptr<Recording> recording;
+  bool clocks_agree = false;  // after AlignClocks
 };
 
 // Adds RECORDING..., --camera-topic, --imu-topic, --keyframes and

@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "client/cli/clock_alignment.h"
 #include "client/cli/device_data.h"
 #include "client/cli/error_lines.h"
 #include "client/cli/progress.h"
@@ -60,6 +61,13 @@ class Feed {
                       recording->cameras().size(),
                       options_.rig,
                       active.rig.factory.cameras.size())));
+    }
+    if (!options_.clocks_agree) {
+      progress_.Say("comparing the clocks of images and readings");
+      const absl::Status aligned =
+          AlignClocks(options_.session, active.theta, {}, recording);
+      progress_.Clear();
+      if (!aligned.ok()) return FailInput(aligned);
     }
     OdometryOptions odometry{.session = options_.session,
                              .keyframe_rate_hz = options_.keyframe_rate_hz,

@@ -17,6 +17,7 @@ struct FeedOptions {
   int keyframes = 40;                                  // of a segment
   double keyframe_rate_hz = 10;                        // at most
   std::optional<double> temperature_c = std::nullopt;  // of the device
+  bool clocks_agree = false;  // AlignClocks was called for the recording
 };
 
 struct FeedCounts {
@@ -26,12 +27,12 @@ struct FeedCounts {
 };
 
 // Sends the segments of a recording, from the end of what the daemon has of
-// this session. The motion of each is estimated with the calibration that is
-// active then: the next segment waits until the daemon has scored the one
-// before and ended the run that it started, so that the same recording leads to
-// the same calibration however fast the machine is. Shows progress, and prints
-// a line for each segment whose motion was not found. Returns the exit code,
-// after the error was printed.
+// this session. Aligns its clocks first. The motion of each is estimated with
+// the calibration that is active then: the next segment waits until the daemon
+// has scored the one before and ended the run that it started, so that the same
+// recording leads to the same calibration however fast the machine is. Shows
+// progress, and prints a line for each segment whose motion was not found.
+// Returns the exit code, after the error was printed.
 int FeedRecording(Context* context,
                   const FeedOptions& options,
                   Recording* recording,

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <string>
 #include <utility>
 
+#include "client/odometry/first_tracks.h"
 #include "client/odometry/odometry.h"
-#include "client/tracking/feature_tracker.h"
 #include "core/calibration/calibrate.h"
 #include "core/calibration/theta_prior.h"
 #include "core/initialisation/rotation_start.h"
@@ -18,44 +17,9 @@ namespace selfcal::client {
 namespace {
 
 constexpr int kSegments = 10;
-constexpr double kSeconds = 20;
 // An offset that differs by less from the given one is found later, and better.
 constexpr double kLeastOffset_s = 5e-3;
 constexpr double kOffsetSigmas = 3;
-
-// Tracks of one camera: those of the recording, or followed by its images
-// alone: the gyroscope does not help before it is known where the camera looks.
-absl::StatusOr<std::vector<TrackedImage>> TracksOf(
-    Recording* recording, const CameraCalibration& theta, int camera) {
-  Calibration alone;
-  alone.cameras = {theta};
-  FeatureTracker tracker(alone, {});
-  std::vector<TrackedImage> images;
-  const std::vector<std::int64_t>& times_ns =
-      recording->cameras()[camera].image_times_ns;
-  for (std::size_t i = 0; i < times_ns.size(); ++i) {
-    if (1e-9 * static_cast<double>(times_ns[i] - times_ns[0]) > kSeconds) break;
-    if (const auto* points = recording->Points(camera, static_cast<int>(i))) {
-      TrackedImage& recorded = images.emplace_back();
-      recorded.t_ns = times_ns[i];
-      for (const RecordedPoint& point : *points) {
-        recorded.points.push_back({point.landmark, point.z_px});
-      }
-      continue;
-    }
-    auto pixels = recording->ReadImage(camera, static_cast<int>(i));
-    if (!pixels.ok()) continue;
-    const cv::Mat image(
-        pixels->height_px, pixels->width_px, CV_8UC1, pixels->pixels.data());
-    TrackedImage tracked;
-    tracked.t_ns = times_ns[i];
-    for (const TrackPoint& point : tracker.Track(times_ns[i], {image})) {
-      tracked.points.push_back({point.landmark, point.z_px});
-    }
-    images.push_back(std::move(tracked));
-  }
-  return images;
-}
 
 // Moves a camera to where its rotations agree with those of the gyroscope.
 absl::Status Turn(Recording* recording,
@@ -64,12 +28,12 @@ absl::Status Turn(Recording* recording,
                   int camera,
                   Calibration* theta) {
   CameraCalibration& moved = theta->cameras[camera];
-  const auto images = TracksOf(recording, moved, camera);
-  if (!images.ok()) return images.status();
+  const std::vector<TrackedImage> images =
+      FirstTracks(recording, moved, camera);
   const RotationStartResult found =
       FindRotationStart(moved,
                         theta->imu,
-                        *images,
+                        images,
                         recording->imu(),
                         {.search_rotation = unknown.rotation,
                          .estimate_focal_scale = unknown.focal});

@@ -19,6 +19,10 @@ namespace selfcal::client {
 
 namespace fs = std::filesystem;
 
+void Recording::ShiftReadings(std::int64_t by_ns) {
+  for (ImuSample& sample : data_.imu) sample.t_ns += by_ns;
+}
+
 absl::StatusOr<GreyPixels> Recording::Checked(absl::StatusOr<GreyPixels> pixels,
                                               const std::string& where,
                                               int j) const {

@@ -65,6 +65,10 @@ class Recording {
   // Parts that were left out or repaired: a sentence each.
   const std::vector<std::string>& problems() const { return data_.problems; }
 
+  // Adds a time to the stamps of all readings, where cameras and IMU have
+  // clocks of their own.
+  void ShiftReadings(std::int64_t by_ns);
+
   // Reads an image by its index in image_times_ns of a camera. DATA_LOSS with
   // the file for one that is damaged or, if the camera has a calibration, of
   // another size; NOT_FOUND for a file that is gone.
@@ -87,7 +91,7 @@ class Recording {
                                      int j) const;
 
  private:
-  const RecordedData data_;
+  RecordedData data_;
 };
 
 // Images of one time: for each camera the index of its image, or -1. The stamp

@@ -42,6 +42,19 @@ def command(
             "--selfcald", SELFCALD, *options]  # fmt: skip
 
 
+def copy_with_readings_later(
+    recording: pathlib.Path, copy: pathlib.Path, by_ns: int
+) -> pathlib.Path:
+    shutil.copytree(recording, copy)
+    readings = copy / "mav0/imu0/data.csv"
+    first, *lines = readings.read_text().splitlines(keepends=True)
+    for n, line in enumerate(lines):
+        stamp, rest = line.split(",", 1)
+        lines[n] = f"{int(stamp) + by_ns},{rest}"
+    readings.write_text(first + "".join(lines))
+    return copy
+
+
 def calibrate(recording: pathlib.Path, output: pathlib.Path, *options: str):
     return subprocess.run(
         command(recording, output, *options),
@@ -132,6 +145,19 @@ class Calibrate(unittest.TestCase):
             check=True,
         )
         self.assertIn("device", listed.stdout)
+
+    def test_aligns_two_clocks(self) -> None:
+        late = copy_with_readings_later(
+            self.walk, self.folder / "late", 86_400_250_000_000
+        )
+        output = self.folder / "aligned"
+        done = calibrate(late, output)
+        self.assertIn(done.returncode, (0, 5), done.stderr)
+        self.assertRegex(
+            done.stderr,
+            r"the clock of the readings is 86400\.2\d\d s ahead of that of the",
+        )
+        self.check_against_truth(output)
 
     def test_says_what_to_record(self) -> None:
         output = self.folder / "asked"
@@ -279,6 +305,15 @@ class Broken(unittest.TestCase):
             self.folder / "still", "--seconds", "8", "--excitation", "0"
         )
         self.expect(still, "no motion was found")
+
+    def test_two_clocks_and_no_motion(self) -> None:
+        still = render(
+            self.folder / "resting", "--seconds", "8", "--excitation", "0"
+        )
+        late = copy_with_readings_later(
+            still, self.folder / "late", 86_400_000_000_000
+        )
+        self.expect(late, "have no time in common")
 
     def test_all_dark(self) -> None:
         dark = render(self.folder / "dark", "--seconds", "5")
