@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -90,7 +91,9 @@ DistortionModel ModelNamed(const std::string& name) {
 
 // Replaces the calibration of the rig by a start that the first recording
 // gives.
-int MoveToStart(RecordedSession* first, RecordedRig* recorded) {
+int MoveToStart(std::optional<double> temperature_c,
+                RecordedSession* first,
+                RecordedRig* recorded) {
   Rig known;
   const auto faults = FromProto(recorded->rig, "rig", &known);
   if (!faults.empty()) return kDone;  // the daemon lists them
@@ -107,8 +110,8 @@ int MoveToStart(RecordedSession* first, RecordedRig* recorded) {
   if (!aligned.ok()) return FailInput(aligned);
   first->clocks_agree = true;
   progress.Say("calibrating on the first 40 s");
-  const auto start =
-      FindStart(first->recording.get(), known, recorded->unknown);
+  const auto start = FindStart(
+      first->recording.get(), known, recorded->unknown, temperature_c);
   progress.Clear();
   if (start.ok()) {
     *recorded->rig.mutable_factory() = ToProto(start->theta);
@@ -145,9 +148,9 @@ int EnsureRig(Context* context,
                                   &losses);
   PrintLosses(losses);
   if (!recorded.ok()) return FailInput(recorded.status());
-  if (const int code = MoveToStart(first, &*recorded); code != kDone) {
-    return code;
-  }
+  const int moved =
+      MoveToStart(input.recordings.temperature_c, first, &*recorded);
+  if (moved != kDone) return moved;
   using RigService = v1::RigService::StubInterface;
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::CreateRigRequest request;
@@ -222,6 +225,7 @@ int FeedAndCalibrate(Context* context,
                        .session = session.name,
                        .keyframes = input.recordings.keyframes,
                        .keyframe_rate_hz = input.recordings.keyframe_rate_hz,
+                       .temperature_c = input.recordings.temperature_c,
                        .clocks_agree = session.clocks_agree},
                       session.recording.get(),
                       &counts);

@@ -7,6 +7,7 @@
 
 #include "client/cli/context.h"
 #include "client/cli/positive_number.h"
+#include "client/cli/temperature_option.h"
 
 namespace selfcal::client {
 namespace {
@@ -55,6 +56,9 @@ void AddRecordingsOptions(CLI::App* command, RecordingsInput* input) {
                    "Keyframes are at most so many in a second [Hz]")
       ->check(AboveZero())
       ->capture_default_str();
+  AddTemperature(command,
+                 "Temperature of the device during the recordings",
+                 &input->temperature_c);
 }
 
 absl::StatusOr<std::vector<RecordedSession>> OpenSessions(

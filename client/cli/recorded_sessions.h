@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct RecordingsInput {
   RecordingOptions topics;
   int keyframes = 40;
   double keyframe_rate_hz = 10;
+  std::optional<double> temperature_c = std::nullopt;
 };
 
 struct RecordedSession {
@@ -25,8 +27,8 @@ struct RecordedSession {
   bool clocks_agree = false;  // after AlignClocks
 };
 
-// Adds RECORDING..., --camera-topic, --imu-topic, --keyframes and
-// --keyframe-rate. `input` must outlive the command.
+// Adds RECORDING..., --camera-topic, --imu-topic, --keyframes, --keyframe-rate
+// and --temperature. `input` must outlive the command.
 void AddRecordingsOptions(CLI::App* command, RecordingsInput* input);
 
 // Opens all recordings, and prints what was left out of them. A session has the

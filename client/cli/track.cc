@@ -2,13 +2,11 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "client/cli/commands.h"
 #include "client/cli/recorded_sessions.h"
 #include "client/cli/recording_feed.h"
-#include "client/cli/temperature_option.h"
 #include "client/text/text.h"
 
 namespace selfcal::client {
@@ -17,7 +15,6 @@ namespace {
 struct TrackOptions {
   std::string rig;
   RecordingsInput recordings;
-  std::optional<double> temperature_c;
 };
 
 int Track(Context* context, const TrackOptions& options) {
@@ -31,7 +28,7 @@ int Track(Context* context, const TrackOptions& options) {
                        .session = session.name,
                        .keyframes = options.recordings.keyframes,
                        .keyframe_rate_hz = options.recordings.keyframe_rate_hz,
-                       .temperature_c = options.temperature_c},
+                       .temperature_c = options.recordings.temperature_c},
                       session.recording.get(),
                       &counts);
     if (code != kDone) return code;
@@ -52,9 +49,6 @@ void AddTrack(CLI::App* app, Context* context) {
   const auto options = std::make_shared<TrackOptions>();
   command->add_option("RIG", options->rig)->required();
   AddRecordingsOptions(command, &options->recordings);
-  AddTemperature(command,
-                 "Temperature of the device during the recordings",
-                 &options->temperature_c);
   command->callback([context, options] {
     context->command = [context, options] { return Track(context, *options); };
   });

@@ -59,7 +59,8 @@ absl::Status Turn(Recording* recording,
 absl::StatusOr<CalibrationStart> FindStart(
     Recording* recording,
     const Rig& given,
-    const std::vector<UnknownOfCamera>& unknown) {
+    const std::vector<UnknownOfCamera>& unknown,
+    std::optional<double> temperature_c) {
   Rig rig = given;
   const std::vector<char> offsets = EstimatedTimeOffsets(rig);
   for (std::size_t j = 0; j < unknown.size(); ++j) {
@@ -70,7 +71,10 @@ absl::StatusOr<CalibrationStart> FindStart(
                                      &rig.factory);
     if (!turned.ok()) return turned;
   }
-  Odometry odometry(recording, rig, rig.factory, {.session = "start"});
+  Odometry odometry(recording,
+                    rig,
+                    rig.factory,
+                    {.session = "start", .temperature_c = temperature_c});
   std::vector<MotionSegment> segments;
   std::string failure = "the recording is too short";
   for (int i = 0; i < kSegments; ++i) {

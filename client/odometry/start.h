@@ -4,6 +4,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <optional>
 #include <vector>
 
 #include "client/recording/recording.h"
@@ -37,12 +38,14 @@ struct CalibrationStart {
 // directions about which the data says as much as the prior, and by nothing
 // that matters in all others.
 //
-// `unknown` has an entry for each camera. NOT_FOUND with the reason if there is
+// `unknown` has an entry for each camera; the temperature [deg C] is that of
+// the recording, if it is known. NOT_FOUND with the reason if there is
 // no motion, the rotation of a camera is not found or the calibration does not
 // converge, and the errors of Odometry.
 absl::StatusOr<CalibrationStart> FindStart(
     Recording* recording,
     const Rig& rig,
-    const std::vector<UnknownOfCamera>& unknown);
+    const std::vector<UnknownOfCamera>& unknown,
+    std::optional<double> temperature_c = std::nullopt);
 
 }  // namespace selfcal::client

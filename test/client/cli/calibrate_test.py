@@ -151,13 +151,26 @@ class Calibrate(unittest.TestCase):
             self.walk, self.folder / "late", 86_400_250_000_000
         )
         output = self.folder / "aligned"
-        done = calibrate(late, output)
+        done = calibrate(late, output, "--temperature", "31.5")
         self.assertIn(done.returncode, (0, 5), done.stderr)
         self.assertRegex(
             done.stderr,
             r"the clock of the readings is 86400\.2\d\d s ahead of that of the",
         )
         self.check_against_truth(output)
+        daemon = RunningDaemon(SELFCALD, f"{output}/state")
+        self.addCleanup(daemon.stop)
+        shown = subprocess.run(
+            [SELFCAL, "--target", daemon.target, "--json",
+             "segment", "list", "device"],
+            capture_output=True,
+            text=True,
+            check=True,
+        )  # fmt: skip
+        segments = json.loads(shown.stdout)["segments"]
+        self.assertGreater(len(segments), 2)
+        for segment in segments:
+            self.assertEqual(segment["temperature_c"], 31.5)
 
     def test_says_what_to_record(self) -> None:
         output = self.folder / "asked"
