@@ -89,8 +89,8 @@ DistortionModel ModelNamed(const std::string& name) {
       });
 }
 
-// Replaces the calibration of the rig by a start that the first recording
-// gives.
+// Aligns the clocks of the first recording, and replaces the calibration of the
+// rig by a start that it gives.
 int MoveToStart(std::optional<double> temperature_c,
                 RecordedSession* first,
                 RecordedRig* recorded) {

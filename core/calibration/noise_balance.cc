@@ -96,10 +96,12 @@ std::vector<NoiseProblem::LinkNoise> NoiseProblem::SplitInertialNoise(
 NoiseProblem::NoiseProblem(const SolverRound& round,
                            const CalibrationEstimate& estimate,
                            const std::vector<ScreenedLandmark>& landmarks,
-                           double track_noise)
+                           double track_noise,
+                           double least_excess)
     : round_(round),
       estimate_(estimate),
       track_noise_(track_noise),
+      least_excess_(least_excess),
       inertial_(SplitInertialNoise(
           round,
           ChainThetas(BoxPlus(round.reference, estimate.d), round.problem),
@@ -136,7 +138,7 @@ std::optional<NoiseBalance> NoiseProblem::Evaluate(
 
 // The common errors of a track do not depend on the pixel sigma.
 void NoiseProblem::ScaleLandmarks(double pixel_factor) {
-  const double excess = std::max(1.0, track_noise_ / pixel_factor);
+  const double excess = std::max(least_excess_, track_noise_ / pixel_factor);
   for (ScreenedLandmark& landmark : landmarks_) {
     landmark.weight *= excess_ * excess_ / (excess * excess);
   }

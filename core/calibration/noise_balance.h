@@ -37,18 +37,22 @@ struct NoiseBalance {
 
 class NoiseProblem {
  public:
-  // The arguments are those of EstimateNoiseScales; they must outlive this.
+  // The arguments are those of EstimateNoiseScales; they must outlive this. The
+  // noise of pixels relative to all other factors is their scale times
+  // `least_excess`, or the track noise if that is larger. Below one, weights of
+  // landmarks exceed one here.
   NoiseProblem(const SolverRound& round,
                const CalibrationEstimate& estimate,
                const std::vector<ScreenedLandmark>& landmarks,
-               double track_noise);
+               double track_noise,
+               double least_excess = 1);
 
   // Returns nullopt if the linear system fails.
   std::optional<NoiseBalance> Evaluate(const NoiseVector& log_factors);
 
   // Returns true if, at the last noise scales, the weight of reprojections
   // relative to all other factors depended on the pixel sigma.
-  bool PixelsCount() const { return excess_ <= 1; }
+  bool PixelsCount() const { return excess_ <= least_excess_; }
 
  private:
   // Parts of the covariance of one link at unit noise scales: that of each kind
@@ -78,10 +82,11 @@ class NoiseProblem {
   const SolverRound& round_;
   const CalibrationEstimate& estimate_;
   const double track_noise_;
+  const double least_excess_;
   const std::vector<LinkNoise> inertial_;
   // Weights scaled by the current noise scales.
   std::vector<ScreenedLandmark> landmarks_;
-  double excess_ = 1;  // of the track noise over the pixel sigma
+  double excess_ = 1;  // of the noise of pixels over the pixel sigma
   Rig rig_;
   CalibrationProblem problem_;
   std::vector<InertialMatrix> whitening_;

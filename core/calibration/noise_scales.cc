@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/calibration/noise_balance.h"
+#include "core/calibration/track_noise.h"
 
 namespace selfcal {
 namespace {
@@ -42,8 +43,11 @@ constexpr double kMayBeDetermined = 0.5 / Square(kDeterminedLogSigma);
 constexpr double kMaxDistance = 0.3;
 constexpr double kRelevantRedundancy = 0.5;
 // Errors of tracks have much in common if the track noise exceeds the noise
-// scale of pixels by this factor.
+// scale of pixels by this factor, or that scale the noise between successive
+// keyframes.
 constexpr double kMuchInCommon = 1.2;
+// Part of the rows of the gyroscope that is not absorbed where images decide.
+constexpr double kImagesDecide = 0.5;
 
 // Prior information about the logarithms of the noise scales relative to the
 // stated noise.
@@ -258,6 +262,18 @@ double GuessPixelFactor(const SolverRound& round,
          std::sqrt(left);
 }
 
+// How far images rather than the gyroscope decide how one keyframe moves
+// against the next, from 0 to 1: where the gyroscope decides, its residuals are
+// absorbed, and slower errors of pixels tell the noise scales apart.
+double ShareOfImages(const SolverRound& round,
+                     const std::vector<NoiseScale>& scales) {
+  const double rows =
+      3.0 * static_cast<double>(round.problem.inertial_links.size());
+  return std::min(
+      1.0,
+      scales[IndexOf(NoiseKind::kGyro)].redundancy / (kImagesDecide * rows));
+}
+
 // The maximum from this start.
 std::vector<NoiseScale> ScalesFrom(const NoiseVector& start,
                                    const NoiseVector& taken,
@@ -300,11 +316,17 @@ std::vector<NoiseScale> EstimateNoiseScales(
   start[IndexOf(NoiseKind::kPixel)] =
       std::log(GuessPixelFactor(round, estimate, landmarks));
   std::vector<NoiseScale> scales = ScalesFrom(start, taken, &problem);
-  if (scales.empty() ||
-      track_noise < kMuchInCommon * scales[IndexOf(NoiseKind::kPixel)].factor) {
+  if (scales.empty()) return scales;
+  const double successive = SuccessiveNoiseRatio(round, estimate, landmarks);
+  if (track_noise < kMuchInCommon * scales[IndexOf(NoiseKind::kPixel)].factor &&
+      kMuchInCommon * successive > 1) {
     return scales;
   }
-  NoiseProblem apart(round, estimate, landmarks, 0);
+  NoiseProblem apart(round,
+                     estimate,
+                     landmarks,
+                     0,
+                     std::pow(successive, ShareOfImages(round, scales)));
   for (int i = 0; i < kNoiseKinds; ++i) start[i] = std::log(scales[i].factor);
   const std::vector<NoiseScale> others = ScalesFrom(start, taken, &apart);
   if (others.empty()) return {};

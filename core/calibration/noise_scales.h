@@ -38,9 +38,11 @@ namespace selfcal {
 // errors are correlated along tracks, and the reprojections are weighted by it
 // relative to all other factors. What is common to a track does not move one
 // keyframe against the next, though, and independent errors of that size would
-// explain motion that is the noise of the IMU: if the excess is much, the white
-// noise of each sensor is the larger one of two estimates, with and without it.
-// Returns an empty vector if the linear system fails.
+// explain motion that is the noise of the IMU. Nor do errors that change slowly
+// (SuccessiveNoiseRatio), where images decide how keyframes move against each
+// other. If either matters, the white noise of each sensor is the larger one of
+// two estimates, with the track noise, and with the noise between successive
+// keyframes. Returns an empty vector if the linear system fails.
 std::vector<NoiseScale> EstimateNoiseScales(
     const Rig& stated,
     const SolverRound& round,

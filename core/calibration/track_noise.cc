@@ -1,13 +1,17 @@
 #include "core/calibration/track_noise.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <optional>
+#include <utility>
 
 #include "core/calibration/chain_thetas.h"
 #include "core/calibration/landmark_position.h"
 #include "core/factor/reprojection.h"
+#include "core/model/median.h"
 
 namespace selfcal {
 namespace {
@@ -166,6 +170,15 @@ class TrackSummer {
   std::vector<Eigen::MatrixXd> chain_directions_;  // of the theta, by thetas_
 };
 
+// The residuals of a landmark in the last keyframe of a camera and in the one
+// before.
+struct LastResiduals {
+  int keyframe = -1;
+  int count = 0;  // of successive keyframes
+  Eigen::Vector2d one_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d two_px = Eigen::Vector2d::Zero();
+};
+
 }  // namespace
 
 double TrackNoiseFactor(const SolverRound& round,
@@ -195,6 +208,45 @@ double TrackNoiseFactor(const SolverRound& round,
   return std::sqrt(all.scatter / all.information * residuals /
                    (residuals - absorbed)) /
          stiffness;
+}
+
+double SuccessiveNoiseRatio(const SolverRound& round,
+                            const CalibrationEstimate& estimate,
+                            const std::vector<ScreenedLandmark>& landmarks) {
+  const ChainThetas thetas(BoxPlus(round.reference, estimate.d), round.problem);
+  std::vector<double> squares, differences;
+  for (const ScreenedLandmark& landmark : landmarks) {
+    const Track& track = round.problem.tracks[landmark.track];
+    const Eigen::Vector4d point_G = landmark.position.Homogeneous();
+    std::map<int, LastResiduals> of_cameras;
+    for (const UsedObservation& used : landmark.used) {
+      const TrackObservation& seen = track.observations[used.index];
+      const KeyframeState& x = estimate.keyframes[seen.keyframe];
+      Eigen::Vector2d r_px;
+      if (!Reproject(x.q_GI,
+                     x.p_GI,
+                     thetas.OfKeyframe(seen.keyframe).cameras[seen.camera],
+                     point_G,
+                     seen.z_px,
+                     &r_px,
+                     nullptr,
+                     round.motions.At(seen.keyframe, seen.camera))) {
+        continue;
+      }
+      LastResiduals& last = of_cameras[seen.camera];
+      if (seen.keyframe != last.keyframe + 1) last.count = 0;
+      if (last.count >= 2) {
+        squares.push_back(last.one_px.squaredNorm());
+        differences.push_back(
+            (r_px - 2 * last.one_px + last.two_px).squaredNorm() / 6);
+      }
+      last = {seen.keyframe, last.count + 1, r_px, last.one_px};
+    }
+  }
+  if (static_cast<int>(squares.size()) < kLeastRedundancy) return 1;
+  const double square = UpperMedian(std::move(squares));
+  if (!(square > 0)) return 1;
+  return std::min(1.0, std::sqrt(UpperMedian(std::move(differences)) / square));
 }
 
 }  // namespace selfcal

@@ -9,7 +9,9 @@
 #include <cstdio>
 
 #include "core/calibration/calibrate.h"
+#include "core/calibration/subspace.h"
 #include "core/simulation/simulate.h"
+#include "test/core/calibration/screened_session.h"
 
 namespace selfcal {
 namespace {
@@ -96,6 +98,47 @@ TEST(TrackNoise, SigmasAreConsistentWhenTracksDrift) {
   std::printf("mean NEES of 26: %.1f, unweighted %.1f\n",
               with / kSeeds,
               without / kSeeds);
+}
+
+// At the truth of a session with these errors.
+double SuccessiveRatio(const SimulationOptions& options) {
+  const ScreenedSession session(
+      HandheldRig("r"), *MakeHandheld(8.5, 1, options.seed), options);
+  const auto whitening = WhitenInertialLinks(session.rig,
+                                             session.rig.factory,
+                                             session.problem,
+                                             session.problem.keyframes);
+  const Eigen::MatrixXd basis =
+      TangentBasis(session.rig, WholeSubspace(session.rig));
+  return SuccessiveNoiseRatio(
+      {.rig = session.rig,
+       .reference = session.rig.factory,
+       .problem = session.problem,
+       .motions = session.motions,
+       .whitening = whitening,
+       .basis = basis,
+       .loss = session.screening.loss},
+      {Eigen::VectorXd::Zero(TangentSize(session.rig.factory)),
+       session.problem.keyframes},
+      session.screening.landmarks);
+}
+
+// The variance of a second difference of errors with the correlation a from one
+// to the next is 6 - 8 a + 2 a^2 of theirs, of which landmarks absorb a part.
+TEST(SuccessiveNoise, IsThatOfSecondDifferences) {
+  SimulationOptions options;
+  options.seed = 5;
+  options.mean_track_length = 40;
+  options.revisit_fraction = 0;
+  EXPECT_GT(SuccessiveRatio(options), 0.97);
+  for (const double a : {0.4, 0.8}) {
+    options.pixel_correlation = a;
+    const double expected = std::sqrt((6 - 8 * a + 2 * a * a) / 6);
+    const double ratio = SuccessiveRatio(options);
+    EXPECT_GT(ratio, 0.97 * expected);
+    EXPECT_LT(ratio, 1.5 * expected);
+    std::printf("ratio %.3f, of errors alone %.3f\n", ratio, expected);
+  }
 }
 
 }  // namespace
