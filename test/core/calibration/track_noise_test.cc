@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 
 #include "core/calibration/calibrate.h"
 #include "core/calibration/subspace.h"
+#include "core/calibration/theta_information.h"
 #include "core/simulation/simulate.h"
 #include "test/core/calibration/screened_session.h"
 
