@@ -59,8 +59,8 @@ absl::Status SetBlock(const std::string& name,
         fmt::format("name: there is no block '{}'", name));
   }
   if (fits) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      fmt::format("size: {} does not have {} values", name, values.size()));
+  return absl::InvalidArgumentError(fmt::format(
+      "size: {} is not a number of values of {}", values.size(), name));
 }
 
 }  // namespace selfcal::c

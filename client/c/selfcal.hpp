@@ -228,17 +228,15 @@ class Calibration {
   }
 
   // Angular rate w_I [rad/s] and specific force f_I [m/s^2] in the body frame,
-  // from readings and biases (selfcal_calibration_correct_imu).
+  // from readings and biases, with dw/dt = 0.
   void CorrectImu(const double (&gyro)[3],
                   const double (&accel)[3],
                   const double (&b_g)[3],
                   const double (&b_a)[3],
                   double (&w_I)[3],
                   double (&f_I)[3]) const {
-    selfcal_error error;
-    internal::Check(selfcal_calibration_correct_imu(
-                        handle_.get(), gyro, accel, b_g, b_a, w_I, f_I, &error),
-                    error);
+    const double dw_I[3] = {0, 0, 0};
+    CorrectImu(gyro, accel, b_g, b_a, dw_I, w_I, f_I);
   }
   // The same at an angular acceleration (selfcal_calibration_correct_imu_dw).
   void CorrectImu(const double (&gyro)[3],

@@ -100,15 +100,10 @@ int MoveToStart(std::optional<double> temperature_c,
   // Blocks that the daemon would add, and groups.
   AddEstimatedBlocks(known.blocks, &known.factory);
   known.groups = DefaultGroups(known.blocks, known.factory);
-  Progress progress("start");
-  progress.Say("comparing the clocks of images and readings");
-  const absl::Status aligned = AlignClocks(first->name,
-                                           known.factory,
-                                           recorded->unknown.front(),
-                                           first->recording.get());
-  progress.Clear();
+  const absl::Status aligned =
+      AlignClocks(known.factory, recorded->unknown.front(), first);
   if (!aligned.ok()) return FailInput(aligned);
-  first->clocks_agree = true;
+  Progress progress("start");
   progress.Say("calibrating on the first 40 s");
   const auto start = FindStart(
       first->recording.get(), known, recorded->unknown, temperature_c);
@@ -219,16 +214,8 @@ int FeedAndCalibrate(Context* context,
   if (ensured != kDone) return ensured;
   FeedCounts counts;
   for (RecordedSession& session : *sessions) {
-    const int code =
-        FeedRecording(context,
-                      {.rig = *input.rig.id,
-                       .session = session.name,
-                       .keyframes = input.recordings.keyframes,
-                       .keyframe_rate_hz = input.recordings.keyframe_rate_hz,
-                       .temperature_c = input.recordings.temperature_c,
-                       .clocks_agree = session.clocks_agree},
-                      session.recording.get(),
-                      &counts);
+    const int code = FeedRecording(
+        context, *input.rig.id, input.recordings, &session, &counts);
     if (code != kDone) return code;
   }
   PrintError(fmt::format("{} stored, {} left out",

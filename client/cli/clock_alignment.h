@@ -3,20 +3,17 @@
 
 #include <absl/status/status.h>
 
-#include <string>
-
+#include "client/cli/recorded_sessions.h"
 #include "client/odometry/start.h"
-#include "client/recording/recording.h"
 #include "core/model/calibration.h"
 
 namespace selfcal::client {
 
-// Moves the readings of a recording to the clock of its images, if they have
-// another one (FindClockShift), and says by how much. `unknown` is that of the
-// first camera.
-absl::Status AlignClocks(const std::string& session,
-                         const Calibration& theta,
+// Moves the readings of a session to the clock of its images, if they have
+// another one (FindClockShift), and says by how much; once for each session.
+// `unknown` is that of the first camera.
+absl::Status AlignClocks(const Calibration& theta,
                          const UnknownOfCamera& unknown,
-                         Recording* recording);
+                         RecordedSession* session);
 
 }  // namespace selfcal::client

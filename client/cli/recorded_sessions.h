@@ -24,7 +24,7 @@ struct RecordingsInput {
 struct RecordedSession {
   std::string name;
   std::unique_ptr<Recording> recording;
-  bool clocks_agree = false;  // after AlignClocks
+  bool clocks_agree = false;  // after AlignClocks (clock_alignment.h)
 };
 
 // Adds RECORDING..., --camera-topic, --imu-topic, --keyframes, --keyframe-rate

@@ -31,25 +31,32 @@ constexpr std::chrono::seconds kAcknowledgement{60};
 
 class Feed {
  public:
-  Feed(Context* context, const FeedOptions& options, FeedCounts* counts)
+  Feed(Context* context,
+       const std::string& rig,
+       const RecordingsInput& input,
+       RecordedSession* session,
+       FeedCounts* counts)
       : context_(context),
-        options_(options),
+        rig_(rig),
+        input_(input),
+        session_(session),
         counts_(counts),
         segments_(v1::SegmentService::NewStub(context->Channel())),
         runs_(v1::RecalibrationService::NewStub(context->Channel())),
-        progress_(options.session),
+        progress_(session->name),
         stream_(Connection(),
                 [this](const Acknowledgement& ack) { OnAck(ack); }) {}
 
-  int Run(Recording* recording) {
+  int Run() {
+    Recording* const recording = session_->recording.get();
     DeviceVersion active;
     v1::Segment last;
     grpc::Status status = ReadActive(&active);
     if (status.ok()) {
       status =
           ReadNewestSegment(context_,
-                            options_.rig,
-                            fmt::format("session = \"{}\"", options_.session),
+                            rig_,
+                            fmt::format("session = \"{}\"", session_->name),
                             &last);
     }
     if (!status.ok()) return Fail(*context_, status);
@@ -59,20 +66,15 @@ class Feed {
                       "name the topics of its cameras with --camera-topic, or "
                       "choose cameras of the calibration with --cameras",
                       recording->cameras().size(),
-                      options_.rig,
+                      rig_,
                       active.rig.factory.cameras.size())));
     }
-    if (!options_.clocks_agree) {
-      progress_.Say("comparing the clocks of images and readings");
-      const absl::Status aligned =
-          AlignClocks(options_.session, active.theta, {}, recording);
-      progress_.Clear();
-      if (!aligned.ok()) return FailInput(aligned);
-    }
-    OdometryOptions odometry{.session = options_.session,
-                             .keyframe_rate_hz = options_.keyframe_rate_hz,
-                             .keyframes = options_.keyframes,
-                             .temperature_c = options_.temperature_c};
+    const absl::Status aligned = AlignClocks(active.theta, {}, session_);
+    if (!aligned.ok()) return FailInput(aligned);
+    OdometryOptions odometry{.session = session_->name,
+                             .keyframe_rate_hz = input_.keyframe_rate_hz,
+                             .keyframes = input_.keyframes,
+                             .temperature_c = input_.temperature_c};
     if (const auto name = ParseSegmentName(last.name())) {
       counts_->continued = true;
       // Not joined to the segment before: its motion is not known here.
@@ -95,7 +97,7 @@ class Feed {
     progress_.Clear();
     if (end.unreadable > 0) {
       PrintError(fmt::format("{}: {} images could not be read, e.g. {}",
-                             options_.session,
+                             session_->name,
                              end.unreadable,
                              end.last_error));
     }
@@ -105,7 +107,7 @@ class Feed {
  private:
   ClientOptions Connection() const {
     ClientOptions client = context_->Connection();
-    client.rig = options_.rig;
+    client.rig = rig_;
     client.max_backoff = std::chrono::seconds(1);
     return client;
   }
@@ -117,7 +119,7 @@ class Feed {
   }
 
   grpc::Status ReadActive(DeviceVersion* active) {
-    return ReadDeviceVersion(context_, options_.rig, "active", active);
+    return ReadDeviceVersion(context_, rig_, "active", active);
   }
 
   // Sends a segment and waits for what the daemon does with it.
@@ -160,7 +162,7 @@ class Feed {
 
   grpc::Status WaitForScore(const SegmentKey& key) {
     v1::GetSegmentRequest request;
-    request.set_name(SegmentName(options_.rig, key));
+    request.set_name(SegmentName(rig_, key));
     for (;;) {
       v1::Segment segment;
       const grpc::Status status = Call<SegmentService>(
@@ -175,8 +177,7 @@ class Feed {
   grpc::Status WaitForRun(const OdometryProgress& at) {
     for (;;) {
       v1::Recalibration run;
-      const grpc::Status status =
-          ReadNewestRun(runs_.get(), options_.rig, &run);
+      const grpc::Status status = ReadNewestRun(runs_.get(), rig_, &run);
       if (!status.ok() || run.name().empty() || HasEnded(run)) return status;
       Show(at, ", calibrating");
       std::this_thread::sleep_for(kPollEvery);
@@ -196,7 +197,9 @@ class Feed {
   }
 
   Context* context_;
-  const FeedOptions options_;
+  const std::string rig_;
+  const RecordingsInput& input_;
+  RecordedSession* const session_;
   FeedCounts* counts_;
   const std::unique_ptr<SegmentService> segments_;
   const std::unique_ptr<RecalibrationService> runs_;
@@ -209,10 +212,11 @@ class Feed {
 }  // namespace
 
 int FeedRecording(Context* context,
-                  const FeedOptions& options,
-                  Recording* recording,
+                  const std::string& rig,
+                  const RecordingsInput& input,
+                  RecordedSession* session,
                   FeedCounts* counts) {
-  return Feed(context, options, counts).Run(recording);
+  return Feed(context, rig, input, session, counts).Run();
 }
 
 }  // namespace selfcal::client

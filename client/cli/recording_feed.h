@@ -2,23 +2,12 @@
 // the daemon takes one after the other.
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <string>
 
 #include "client/cli/context.h"
-#include "client/recording/recording.h"
+#include "client/cli/recorded_sessions.h"
 
 namespace selfcal::client {
-
-struct FeedOptions {
-  std::string rig;
-  std::string session;
-  int keyframes = 40;                                  // of a segment
-  double keyframe_rate_hz = 10;                        // at most
-  std::optional<double> temperature_c = std::nullopt;  // of the device
-  bool clocks_agree = false;  // AlignClocks was called for the recording
-};
 
 struct FeedCounts {
   int sent = 0;    // stored by the daemon
@@ -26,16 +15,18 @@ struct FeedCounts {
   bool continued = false;  // an earlier feed of this session had sent segments
 };
 
-// Sends the segments of a recording, from the end of what the daemon has of
-// this session. Aligns its clocks first. The motion of each is estimated with
-// the calibration that is active then: the next segment waits until the daemon
-// has scored the one before and ended the run that it started, so that the same
-// recording leads to the same calibration however fast the machine is. Shows
-// progress, and prints a line for each segment whose motion was not found.
-// Returns the exit code, after the error was printed.
+// Sends the segments of a session, from the end of what the daemon has of it,
+// to a rig; `input` states keyframes and temperature. Aligns its clocks first.
+// The motion of each is estimated with the calibration that is active then: the
+// next segment waits until the daemon has scored the one before and ended the
+// run that it started, so that the same recording leads to the same calibration
+// however fast the machine is. Shows progress, and prints a line for each
+// segment whose motion was not found. Returns the exit code, after the error
+// was printed.
 int FeedRecording(Context* context,
-                  const FeedOptions& options,
-                  Recording* recording,
+                  const std::string& rig,
+                  const RecordingsInput& input,
+                  RecordedSession* session,
                   FeedCounts* counts);
 
 }  // namespace selfcal::client

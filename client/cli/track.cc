@@ -22,15 +22,8 @@ int Track(Context* context, const TrackOptions& options) {
   if (!sessions.ok()) return FailInput(sessions.status());
   FeedCounts counts;
   for (RecordedSession& session : *sessions) {
-    const int code =
-        FeedRecording(context,
-                      {.rig = options.rig,
-                       .session = session.name,
-                       .keyframes = options.recordings.keyframes,
-                       .keyframe_rate_hz = options.recordings.keyframe_rate_hz,
-                       .temperature_c = options.recordings.temperature_c},
-                      session.recording.get(),
-                      &counts);
+    const int code = FeedRecording(
+        context, options.rig, options.recordings, &session, &counts);
     if (code != kDone) return code;
   }
   PrintText(fmt::format("{} stored, {} left out\n",

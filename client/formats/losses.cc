@@ -14,7 +14,7 @@ namespace selfcal::client {
 
 namespace {
 
-// Of every tool that corrects readings.
+// The blocks that every tool has that corrects readings.
 constexpr std::string_view kMatrixBlocks[] = {"gyro.scale",
                                               "gyro.misalignment",
                                               "accel.scale",

@@ -11,8 +11,8 @@
 
 namespace selfcal::client {
 
-// What is to be added to the stamps of the readings of a recording so that they
-// are by the clock of its images, but for a time offset within 0.15 s of that
+// The time to add to the stamps of the readings of a recording so that they are
+// by the clock of its images, but for a time offset within 0.15 s of that
 // of the first camera; 0 if they are. It is found where the rotations of that
 // camera over its first 20 s agree with those of the gyroscope: up to 10 s away
 // or, where images and readings have no time in common, up to 10 s away from

@@ -262,9 +262,10 @@ double GuessPixelFactor(const SolverRound& round,
          std::sqrt(left);
 }
 
-// How far images rather than the gyroscope decide how one keyframe moves
-// against the next, from 0 to 1: where the gyroscope decides, its residuals are
-// absorbed, and slower errors of pixels tell the noise scales apart.
+// The degree, from 0 to 1, to which images rather than the gyroscope decide how
+// one keyframe moves against the next. Where the gyroscope decides, its
+// residuals are absorbed, and slower errors of pixels tell the noise scales
+// apart.
 double ShareOfImages(const SolverRound& round,
                      const std::vector<NoiseScale>& scales) {
   const double rows =

@@ -39,8 +39,8 @@ double TrackNoiseFactor(const SolverRound& round,
 // that of all residuals. Independent errors have the same second differences
 // along a track as at any distance; those of a tracker change slowly, and leave
 // the motion between keyframes more certain than errors of their size would.
-// From medians: of squares of residuals, and of their second differences over
-// three successive keyframes. 1 if the data is insufficient.
+// It compares the median square of residuals with that of their second
+// differences over three successive keyframes. 1 if the data is insufficient.
 double SuccessiveNoiseRatio(const SolverRound& round,
                             const CalibrationEstimate& estimate,
                             const std::vector<ScreenedLandmark>& landmarks);

@@ -381,11 +381,11 @@ TEST_F(CalibrationTest, RefusesBlocksThatDoNotFit) {
   EXPECT_EQ(error("cam2.focal", {500, 500}),
             "name: there is no block 'cam2.focal'");
   EXPECT_EQ(error("cam1.focal", {500}),
-            "size: cam1.focal does not have 1 values");
+            "size: 1 is not a number of values of cam1.focal");
   EXPECT_EQ(error("imu.gyro.scale", {}),
-            "size: imu.gyro.scale does not have 0 values");
+            "size: 0 is not a number of values of imu.gyro.scale");
   EXPECT_EQ(error("imu.accel.position", {1, 2, 3, 4}),
-            "size: imu.accel.position does not have 4 values");
+            "size: 4 is not a number of values of imu.accel.position");
   EXPECT_THAT(error("cam1.focal", {500, -1}),
               ::testing::HasSubstr("calibration.cameras[1].f"));
   EXPECT_EQ(selfcal_calibration_with_block(

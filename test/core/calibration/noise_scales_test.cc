@@ -93,7 +93,7 @@ TEST(NoiseScales, ReweightingAppliesDeterminedScales) {
 
 // Errors of a tracker change slowly, and a part of them is common to a track:
 // taken for independent ones, they would explain a part of what is the noise of
-// the IMU, whose scales would be 0.8, or 0.93 without the common part.
+// the IMU, whose scales would be too small.
 TEST(NoiseScales, OfTheImuAreRightWithTheErrorsOfATracker) {
   constexpr int kSeeds = 6;
   double gyro = 0, accel = 0;

@@ -102,7 +102,7 @@ TEST(TrackNoise, SigmasAreConsistentWhenTracksDrift) {
               without / kSeeds);
 }
 
-// At the truth of a session with these errors.
+// The ratio of a session with these errors, at its truth.
 double SuccessiveRatio(const SimulationOptions& options) {
   const ScreenedSession session(
       HandheldRig("r"), *MakeHandheld(8.5, 1, options.seed), options);
