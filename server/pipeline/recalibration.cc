@@ -114,7 +114,7 @@ absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
     again = false;
     Executor* executor = nullptr;
     {
-      const std::lock_guard lock(mutex_);
+      const std::lock_guard lock(executing_mutex_);
       const auto found = executing_.find(rig);
       if (found != executing_.end()) executor = found->second;
       if (executor == nullptr) end();  // under the lock nobody can begin it
@@ -122,7 +122,7 @@ absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
     if (executor == nullptr) break;
     was_current = executor->current.Cancel(rig, run, [&] {
       // It cannot begin it; another one can, once it executes for the rig.
-      const std::lock_guard lock(mutex_);
+      const std::lock_guard lock(executing_mutex_);
       const auto found = executing_.find(rig);
       again = found == executing_.end() || found->second != executor;
       if (!again) end();
@@ -234,7 +234,7 @@ Execution Recalibrator::ExecuteOwn(Executor* executor,
   const std::optional<RigClaim> claim = shared_.claims->Find(listed.rig);
   if (!claim) return Execution::kDeferred;
   {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(executing_mutex_);
     if (!executing_.emplace(listed.rig, executor).second) {
       return Execution::kDeferred;
     }
@@ -255,7 +255,7 @@ Execution Recalibrator::ExecuteOwn(Executor* executor,
                   listed.rig,
                   run.status().ToString());
   }
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(executing_mutex_);
   executing_.erase(listed.rig);
   return executed;
 }

@@ -92,12 +92,16 @@ class Recalibrator {
   bool estimates_complete_ = false;  // guarded by starting_
   std::vector<std::unique_ptr<Executor>> executors_;
 
-  mutable std::mutex mutex_;  // guards what follows
+  // The executor of each rig's run, from before it begins until after its end.
+  std::map<std::string, Executor*> executing_;
+  std::mutex executing_mutex_;  // of it; Cancel holds it while it writes
+
+  // Guards what follows. Nobody writes while holding it: a stream of segments
+  // may end on the store's thread, which then wakes the executors.
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   bool running_ = false;
   std::int64_t wakes_ = 0;
-  // The executor of each rig's run, from before it begins until after its end.
-  std::map<std::string, Executor*> executing_;
 };
 
 }  // namespace selfcal::server

@@ -143,40 +143,49 @@ void ScoringWorkers::ReturnPlace(const std::string& rig) {
 absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
     const std::string& rig,
     const std::function<absl::StatusOr<QuarantineCommit>()>& change) {
-  absl::StatusOr<QuarantineCommit> commit = absl::UnknownError("");
+  std::set<std::pair<std::string, std::int64_t>> claimed;
   {
-    // Under the lock no worker claims or finishes a segment; a worker that has
-    // claimed one returns its place itself.
     const std::lock_guard lock(mutex_);
-    commit = change();
-    if (!commit.ok()) return commit;
+    changing_.insert(rig);
+    claimed = claimed_;
+  }
+  auto commit = change();
+  int waiting = 0;
+  if (commit.ok()) {
+    // A worker that has claimed one returns its place itself.
     for (const std::int64_t sequence : commit->unscored_sequences) {
-      if (!claimed_.contains({rig, sequence})) EmptyPlaces(rig, 1);
+      if (!claimed.contains({rig, sequence})) ++waiting;
     }
   }
-  changed_.notify_all();
+  EndChange(rig, waiting);
   return commit;
 }
 
 absl::Status ScoringWorkers::Delete(
     const std::string& rig,
     const std::function<absl::StatusOr<int>()>& change) {
-  absl::StatusOr<int> waiting = absl::UnknownError("");
   {
     std::unique_lock lock(mutex_);
-    const auto deleting = deleting_.insert(rig);
+    changing_.insert(rig);
     changed_.wait(lock, [&] {
       const auto first =
           claimed_.lower_bound({rig, std::numeric_limits<std::int64_t>::min()});
       return first == claimed_.end() || first->first != rig;
     });
-    waiting = change();
-    if (waiting.ok()) EmptyPlaces(rig, *waiting);
-    deleting_.erase(deleting);
+  }
+  const absl::StatusOr<int> waiting = change();
+  EndChange(rig, waiting.ok() ? *waiting : 0);
+  return waiting.status();
+}
+
+void ScoringWorkers::EndChange(const std::string& rig, int waiting) {
+  {
+    const std::lock_guard lock(mutex_);
+    EmptyPlaces(rig, waiting);
+    changing_.erase(changing_.find(rig));
     ++arrivals_;  // what was passed over meanwhile is looked at again
   }
   changed_.notify_all();
-  return waiting.status();
 }
 
 void ScoringWorkers::Run() {
@@ -216,7 +225,7 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::Choose(
   for (const Store::Unscored& candidate : unscored) {
     // A rig's next is the oldest that nobody scores.
     if ((!claims.empty() && claims.back().rig == candidate.rig) ||
-        deleting_.contains(candidate.rig) ||
+        changing_.contains(candidate.rig) ||
         claimed_.contains({candidate.rig, candidate.sequence})) {
       continue;
     }

@@ -93,6 +93,9 @@ class ScoringWorkers {
   // lock must be held.
   std::optional<Claim> Choose(const std::vector<Store::Unscored>& unscored);
   void ReturnPlacesOfOthers();
+  // Segments of the rig may be claimed again; so many that waited for their
+  // scores no longer do.
+  void EndChange(const std::string& rig, int waiting);
   // The lock must be held.
   void EmptyPlaces(const std::string& rig, int places);
   void Process(const Claim& claim);
@@ -117,14 +120,18 @@ class ScoringWorkers {
   const std::function<void(const std::string&)> on_done_;
 
   Backlog backlog_;
-  std::mutex mutex_;  // guards what follows
+  // Guards what follows. The store's thread waits for it when it has stored a
+  // segment (FillPlace), so that nobody may wait for a write while holding it.
+  std::mutex mutex_;
   std::condition_variable changed_;
   bool running_ = false;
   std::int64_t arrivals_ = 0;  // reasons to look for segments, since the start
   std::map<std::string, std::int64_t> filled_;  // places in the backlog, by rig
   FairOrder order_;
   std::set<std::pair<std::string, std::int64_t>> claimed_;  // rig, sequence
-  std::multiset<std::string> deleting_;  // rigs of which no segment is claimed
+  // Rigs whose segments are being quarantined or deleted: no further one of
+  // them is claimed.
+  std::multiset<std::string> changing_;
   std::vector<std::thread> threads_;
 };
 

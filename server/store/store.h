@@ -332,7 +332,8 @@ class Store {
                                 const Work& work) = 0;
   // Transact without waiting. Transactions of one thread are carried out in the
   // order in which they begin. `done` is called once, on a thread of the store;
-  // it must be short and must not call the store.
+  // it must be short, and must neither call the store nor take a lock that
+  // somebody holds while waiting for a transaction.
   virtual void BeginTransaction(const std::string& rig,
                                 const Moment& now,
                                 Work work,

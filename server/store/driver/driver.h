@@ -183,8 +183,9 @@ class Database {
   // and waits until it is durable.
   virtual absl::Status Write(Work work) = 0;
   // Write without waiting. Writes of one thread are carried out in their order.
-  // `done` is called once, on a thread of the database; it must be short and
-  // must not read or wait for a write.
+  // `done` is called once, on a thread of the database; it must be short, and
+  // must neither read, nor wait for a write, nor take a lock that somebody
+  // holds while waiting for one.
   virtual void BeginWrite(Work work, Done done) = 0;
   // Runs `query` on a single state of the database.
   virtual absl::Status Read(const Work& query) = 0;

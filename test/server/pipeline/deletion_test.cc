@@ -1,5 +1,5 @@
-// Deletion beside scoring: whatever is being scored is waited for, and nothing
-// of a deleted rig comes back.
+// Deletion beside scoring and storing: whatever is being scored is waited for,
+// nothing of a deleted rig comes back, and nobody waits for each other.
 #include <future>
 
 #include "test/server/pipeline/pipeline_test.h"
@@ -84,6 +84,54 @@ TEST_F(DeletionTest, SegmentThatWaitsForItsScoreGivesItsPlaceBack) {
   ASSERT_TRUE(AllScored());
   EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("a", {"s", 1}).status()));
   EXPECT_EQ(store_->ListSegments("a", Page())->items.size(), 4u);
+}
+
+// The store's thread reports what it has stored while a change of the same rig,
+// which waits for that thread, is under way.
+TEST_F(DeletionTest, SegmentsAreChangedWhileOthersAreStored) {
+  CreateRig();
+  StartOne();
+  const std::vector<std::function<absl::Status()>> changes{
+      [&] {
+        return pipeline_->DeleteSegment("a", {"s", 0}, "eve", "private");
+      },
+      [&] {
+        return pipeline_->QuarantineSegments("a", "s", 2, "eve", "bad")
+            .status();
+      },
+      [&] { return pipeline_->DeleteRig("a", "eve", "sold"); }};
+  std::int64_t index = 0;
+  for (const auto& change : changes) {
+    Submit(index++);
+    ASSERT_TRUE(AllScored());
+    std::promise<void> store_goes_on;
+    store_->BeginTransaction(
+        "a",
+        1,
+        [goes_on = store_goes_on.get_future().share()](UnitOfWork*) {
+          goes_on.wait();
+          return absl::OkStatus();
+        },
+        [](const absl::Status&) {});
+    std::promise<absl::Status> stored;
+    pipeline_->BeginSubmit(
+        "a",
+        Segment(index++),
+        [] { return false; },
+        [&](const absl::StatusOr<SubmitResult>& result) {
+          stored.set_value(result.status());
+        });
+    auto changed = std::async(std::launch::async, change);
+    EXPECT_EQ(changed.wait_for(std::chrono::milliseconds(100)),
+              std::future_status::timeout);
+    store_goes_on.set_value();
+    ASSERT_EQ(changed.wait_for(kLongWait), std::future_status::ready);
+    const absl::Status status = changed.get();
+    EXPECT_TRUE(status.ok()) << status;
+    const absl::Status kept = stored.get_future().get();
+    EXPECT_TRUE(kept.ok()) << kept;
+  }
+  EXPECT_TRUE(absl::IsNotFound(store_->GetRig("a").status()));
 }
 
 TEST_F(DeletionTest, OtherTolerancesScoreWhatIsKeptAnew) {
