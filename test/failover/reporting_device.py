@@ -26,7 +26,9 @@ from selfcal.v1 import (
 )
 
 _SETTLE_S = 180
-_PATIENCE_S = 180  # until a call of the operator succeeds
+# Without progress, until a call of the operator succeeds: on a busy machine a
+# run takes a minute, and the next one may begin before the operator's.
+_PATIENCE_S = 180
 # What a device logs if the hub does not take a report.
 _COMPLAINTS = ("refuses the report", "are reported again", "asks again for all")
 _Run = recalibration_pb2.Recalibration
@@ -186,7 +188,8 @@ class ReportingDevice:
 
     def operate(self, what: Callable) -> None:
         """Does it once it can be done."""
-        deadline = time.monotonic() + _PATIENCE_S
+        before = ""
+        progress = time.monotonic()
         while True:
             try:
                 if what(self):
@@ -196,7 +199,9 @@ class ReportingDevice:
                 if error.code() != grpc.StatusCode.FAILED_PRECONDITION:
                     raise
                 why = error.details()
-            if time.monotonic() > deadline:
+            if why != before:
+                before, progress = why, time.monotonic()
+            if time.monotonic() > progress + _PATIENCE_S:
                 raise processes.Failed(
                     f"{self.rig_id}: {what.__name__} is not possible: {why}"
                 )
