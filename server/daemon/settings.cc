@@ -202,6 +202,11 @@ void DefineQuotas(Definer* define, Quotas* quotas) {
       "Quota of bytes for the database; near it, segments are refused; 0: no "
       "limit",
       kMaxBytes);
+  add("min-free-bytes",
+      &quotas->min_free_bytes,
+      "Bytes that stay free on the disk of the database, a twentieth of it at "
+      "most; else segments are refused",
+      kMaxBytes);
 }
 
 void DefineEstimation(Definer* define, DaemonOptions* options) {

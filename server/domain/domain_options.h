@@ -18,11 +18,14 @@ struct Quotas {
   // Segments of one rig whose metadata and information are kept, the newest
   // ones; a segment that waits for its score, is in a table, or was used by a
   // run or a calibration is never removed.
-  std::int64_t max_segments_per_rig = 0;
+  std::int64_t max_segments_per_rig = 100'000;
   std::int64_t max_segment_age_s = 0;  // the same, by age
   // Size of the whole database. Near the limit new segments are refused, so
   // that those stored can still be scored.
   std::int64_t max_database_bytes = 0;
+  // What stays free on the file system of the database, or a twentieth of it if
+  // that is less. New segments are refused where it would not.
+  std::int64_t min_free_bytes = std::int64_t{256} << 20;
   std::int64_t max_rigs = 10'000;
   // Compressed data of one rig's segments that stays only until it was reported
   // to the hub. Beyond it, the oldest is not reported.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,11 @@ namespace {
 
 // Share of the database reserved for scores, runs and calibrations.
 constexpr double kReservedPart = 0.1;
-constexpr int kMaxDropped = 100;
+constexpr double kFreePart = 0.05;  // of the disk: more need not stay free
+constexpr int kMaxDropped = 200;
+// Segments beyond a quota go when there are so many of them, or a tenth of the
+// quota: an event for each would outgrow what goes.
+constexpr std::int64_t kMostAtOnce = 100;
 
 absl::Status CheckDatabaseSize(UnitOfWork* tx,
                                std::int64_t bytes,
@@ -33,6 +38,23 @@ absl::Status CheckDatabaseSize(UnitOfWork* tx,
       "results: raise max-database-bytes, or set a quota by rig",
       used,
       quotas.max_database_bytes));
+}
+
+absl::Status CheckDisk(UnitOfWork* tx,
+                       std::int64_t bytes,
+                       const Quotas& quotas) {
+  if (quotas.min_free_bytes == 0) return absl::OkStatus();
+  SELFCAL_ASSIGN_OR_RETURN(const std::optional<DiskSpace> disk, DiskOf(tx));
+  if (!disk) return absl::OkStatus();
+  const auto least = std::min(
+      quotas.min_free_bytes,
+      static_cast<std::int64_t>(kFreePart * static_cast<double>(disk->bytes)));
+  if (disk->free_bytes - bytes >= least) return absl::OkStatus();
+  return absl::ResourceExhaustedError(fmt::format(
+      "the disk of the database has {} bytes free, and {} stay free for other "
+      "programs: make room, set a quota by rig, or lower min-free-bytes",
+      disk->free_bytes,
+      least));
 }
 
 // The segment whose data is the least informative: one in no table, or else the
@@ -85,6 +107,7 @@ absl::Status MakeRoom(UnitOfWork* tx,
                       std::int64_t bytes,
                       const Quotas& quotas) {
   SELFCAL_RETURN_IF_ERROR(CheckDatabaseSize(tx, bytes, quotas));
+  SELFCAL_RETURN_IF_ERROR(CheckDisk(tx, bytes, quotas));
   const std::int64_t limit = quotas.max_payload_bytes_per_rig;
   if (limit == 0) return absl::OkStatus();
   SELFCAL_ASSIGN_OR_RETURN(std::int64_t used, DataBytes(tx));
@@ -128,20 +151,21 @@ absl::StatusOr<bool> MakeRoomForReported(UnitOfWork* tx,
 }
 
 absl::Status DropOldSegments(UnitOfWork* tx, const Quotas& quotas) {
-  if (quotas.max_segments_per_rig == 0 && quotas.max_segment_age_s == 0) {
-    return absl::OkStatus();
-  }
   constexpr std::int64_t kSecond = 1'000'000'000;
+  const std::int64_t most = quotas.max_segments_per_rig;
+  if (most == 0 && quotas.max_segment_age_s == 0) return absl::OkStatus();
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestSequence(tx));
+  const std::int64_t at_once =
+      std::clamp<std::int64_t>(most / 10, 1, kMostAtOnce);
+  const bool count = most > 0 && newest > most && newest % at_once == 0;
+  if (!count && quotas.max_segment_age_s == 0) return absl::OkStatus();
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentRow> unreferenced,
                            UnreferencedSegments(tx, kMaxDropped));
   int dropped = 0;
   for (const SegmentRow& segment : unreferenced) {
     // The newest stays whatever its age: the next sequence continues from it.
     if (segment.sequence == newest) continue;
-    const bool too_many =
-        quotas.max_segments_per_rig > 0 &&
-        segment.sequence <= newest - quotas.max_segments_per_rig;
+    const bool too_many = count && segment.sequence <= newest - most;
     const std::int64_t age_ns = tx->now().steady_ns - segment.receive_steady_ns;
     const bool too_old = quotas.max_segment_age_s > 0 &&
                          !tx->now().keeps_aged &&

@@ -27,7 +27,7 @@ absl::StatusOr<bool> MakeRoomForReported(UnitOfWork* tx,
                                          const Quotas& quotas);
 
 // Deletes the records of segments that are older or more than the quotas allow,
-// of at most a hundred segments in one call.
+// of at most two hundred segments in one call.
 absl::Status DropOldSegments(UnitOfWork* tx, const Quotas& quotas);
 
 }  // namespace selfcal::server

@@ -105,6 +105,12 @@ struct DatabaseSize {
   std::int64_t used_bytes = 0;  // without room that later records can fill
 };
 
+// A file system that other programs use as well.
+struct DiskSpace {
+  std::int64_t bytes = 0;
+  std::int64_t free_bytes = 0;  // for this process
+};
+
 // A connection and everything made from it may be used by one thread at a time.
 class Connection {
  public:
@@ -127,6 +133,10 @@ class Connection {
   }
 
   virtual absl::StatusOr<DatabaseSize> Size() = 0;
+  // That of the file; nullopt for an engine that is a server.
+  virtual absl::StatusOr<std::optional<DiskSpace>> Disk() {
+    return std::nullopt;
+  }
   // Columns of all tables of the store.
   virtual absl::StatusOr<std::vector<Column>> Columns() = 0;
   // Checks all that the engine knows to check: that the schema is that of its

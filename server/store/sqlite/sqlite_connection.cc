@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <system_error>
+
 #include "server/status/status_macros.h"
 #include "server/store/driver/statement.h"
 #include "server/store/sqlite/schema_check.h"
@@ -102,6 +105,18 @@ absl::StatusOr<DatabaseSize> SqliteConnection::Size() {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t page_bytes,
                            ReadInt(this, "PRAGMA page_size"));
   return DatabaseSize{pages * page_bytes, (pages - free) * page_bytes};
+}
+
+absl::StatusOr<std::optional<DiskSpace>> SqliteConnection::Disk() {
+  const char* path = sqlite3_db_filename(handle_.get(), "main");
+  std::error_code error;
+  const auto space = std::filesystem::space(path, error);
+  if (error) {
+    return absl::UnavailableError(fmt::format(
+        "the free space beside {} is not known: {}", path, error.message()));
+  }
+  return DiskSpace{static_cast<std::int64_t>(space.capacity),
+                   static_cast<std::int64_t>(space.available)};
 }
 
 absl::StatusOr<std::vector<Column>> SqliteConnection::Columns() {

@@ -7,6 +7,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,6 +32,7 @@ class SqliteConnection final : public Connection {
   }
   const Dialect& dialect() const override;
   absl::StatusOr<DatabaseSize> Size() override;
+  absl::StatusOr<std::optional<DiskSpace>> Disk() override;
   absl::StatusOr<std::vector<Column>> Columns() override;
   void CheckStructure(
       const std::function<bool(const StoreProblem&)>& on_problem) override;

@@ -19,20 +19,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kSize[] = "3m";
-constexpr std::size_t kFillerBytes = 1 << 20;
+// Of the file system, a third of which a filler takes at first.
+constexpr std::size_t kSmallBytes = 3 << 20;
+// A twentieth has room for the scores of what is stored.
+constexpr std::size_t kLargerBytes = 24 << 20;
 
 class FullDiskTest : public DaemonTest {
  protected:
   FullDiskTest() { fs::create_directory(state_); }
 
-  // The daemon on a state folder of kSize of its own, which nobody else sees;
-  // nothing where the system does not let this process have one.
-  std::unique_ptr<Process> StartOnSmallDisk() {
+  // The daemon on a state folder of its own of this size, which nobody else
+  // sees; nothing where the system does not let this process have one.
+  std::unique_ptr<Process> StartOnSmallDisk(std::size_t bytes,
+                                            const std::string& options) {
     const std::string unshare =
         geteuid() == 0 ? "unshare -m" : "unshare -m --map-root-user";
     const std::string mount =
-        "mount -t tmpfs -o mode=0700,size=" + std::string(kSize) + " none " +
+        "mount -t tmpfs -o mode=0700,size=" + std::to_string(bytes) + " none " +
         state_.string();
     const std::string quiet = " >/dev/null 2>&1";
     if (std::system((unshare + " sh -c '" + mount + "'" + quiet).c_str())) {
@@ -44,15 +47,21 @@ class FullDiskTest : public DaemonTest {
             "/bin/sh",
             "-c",
             "exec " + unshare + " sh -c '" + mount + " && head -c " +
-                std::to_string(kFillerBytes) + " /dev/zero >" +
+                std::to_string(bytes / 3) + " /dev/zero >" +
                 (state_ / "filler").string() + " && exec " + SELFCALD_PATH +
-                " --state-dir " + state_.string() +
-                " --listen unix:" + (folder_ / "socket").string() + "'"},
+                " --state-dir " + state_.string() + " --listen unix:" +
+                (folder_ / "socket").string() + options + "'"},
         folder_ / "log");
     EXPECT_TRUE(daemon->Says("selfcald ready")) << daemon->Log();
     channel_ = grpc::CreateChannel("unix:" + (folder_ / "socket").string(),
                                    grpc::InsecureChannelCredentials());
     return daemon;
+  }
+
+  // Its state folder, seen from here.
+  fs::path StateOf(const Process& daemon) const {
+    return fs::path("/proc") / std::to_string(daemon.pid()) / "root" /
+           state_.relative_path();
   }
 
   // Sends until one is not stored; why it is not.
@@ -112,7 +121,7 @@ class FullDiskTest : public DaemonTest {
 };
 
 TEST_F(FullDiskTest, RefusesLosesNothingAndGoesOnWhenThereIsRoom) {
-  const auto daemon = StartOnSmallDisk();
+  const auto daemon = StartOnSmallDisk(kSmallBytes, " --min-free-bytes 0");
   if (!daemon) GTEST_SKIP() << "no file system of its own to be had";
   Promise promise("a full file system refuses cleanly");
   Rig rig = TestRig("r");
@@ -129,13 +138,32 @@ TEST_F(FullDiskTest, RefusesLosesNothingAndGoesOnWhenThereIsRoom) {
   EXPECT_FALSE(StreamUntilRefused(1000).ok());
   promise.lost += Lost();
 
-  fs::remove(fs::path("/proc") / std::to_string(daemon->pid()) / "root" /
-             (state_ / "filler").relative_path());
+  fs::remove(StateOf(*daemon) / "filler");
   EXPECT_TRUE(StreamUntilRefused(3).ok());
   EXPECT_GE(acknowledged_.size(), before + 3);
   promise.lost += Lost();
   promise.lost += IsSound() ? 0 : 1;
   promise.trials = static_cast<int>(acknowledged_.size());
+  daemon->Signal(SIGTERM);
+  EXPECT_EQ(daemon->Wait(), 0);
+}
+
+TEST_F(FullDiskTest, TheLastOfTheDiskStaysFreeForOthers) {
+  const auto daemon = StartOnSmallDisk(kLargerBytes, "");
+  if (!daemon) GTEST_SKIP() << "no file system of its own to be had";
+  Rig rig = TestRig("r");
+  rig.table_size = 100;
+  CreateRig(rig);
+  const grpc::Status refused = StreamUntilRefused(1000);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error_message(), ::testing::HasSubstr("min-free-bytes"));
+  const fs::space_info disk = fs::space(StateOf(*daemon));
+  EXPECT_GT(disk.available, 0u);
+  EXPECT_LT(disk.available, disk.capacity / 5);
+  EXPECT_EQ(Lost(), 0);
+  fs::remove(StateOf(*daemon) / "filler");
+  EXPECT_TRUE(StreamUntilRefused(3).ok());
+  EXPECT_EQ(Lost(), 0);
   daemon->Signal(SIGTERM);
   EXPECT_EQ(daemon->Wait(), 0);
 }

@@ -166,6 +166,20 @@ TEST_P(QuotasTest, OldMetadataGoesButNotWhatACalibrationCameFrom) {
   EXPECT_EQ(store_->GetCalibration("a", 2)->segments.size(), 2u);
 }
 
+// One event for several: those of single segments would fill the database that
+// the quota keeps small.
+TEST_P(QuotasTest, MetadataBeyondALargeQuotaGoesATenthAtATime) {
+  OpenWith({.max_segments_per_rig = 30});
+  for (int k = 0; k < 60; ++k) {
+    PutAndScore(k, 50, 0);  // enters no table
+    const auto kept = store_->ListSegments("a", {})->items.size();
+    EXPECT_LE(kept, 30u + 3u);
+    EXPECT_GE(kept, std::min(k + 1u, 30u));
+  }
+  EXPECT_EQ(Evictions().size(), 9u);
+  EXPECT_THAT(Evictions()[0], HasSubstr("3 segments"));
+}
+
 TEST_P(QuotasTest, MetadataOlderThanItMayBeGoes) {
   OpenWith({});
   const std::int64_t now_ns = NowNs();
