@@ -12,6 +12,7 @@
 #include "client/cli/progress.h"
 #include "client/text/estimate_text.h"
 #include "client/text/text.h"
+#include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 
 namespace selfcal::client {
