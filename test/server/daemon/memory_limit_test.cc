@@ -42,8 +42,10 @@ class MemoryLimit : public DaemonTest {
           grpc::ClientContext context;
           const auto stream = stub->StreamSegments(&context);
           v1::StreamSegmentsResponse response;
+          // DUPLICATE: it was stored before, and its answer was lost with a
+          // stream that was cut off.
           stored = stream->Write(request) && stream->Read(&response) &&
-                   response.verdict() == v1::StreamSegmentsResponse::STORED;
+                   response.verdict() != v1::StreamSegmentsResponse::REJECTED;
           stream->WritesDone();
           while (stream->Read(&response)) {
           }
