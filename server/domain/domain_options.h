@@ -23,8 +23,8 @@ struct Quotas {
   // Size of the whole database. Near the limit new segments are refused, so
   // that those stored can still be scored.
   std::int64_t max_database_bytes = 0;
-  // What stays free on the file system of the database, or a twentieth of it if
-  // that is less. New segments are refused where it would not.
+  // Bytes that stay free on the file system of the database, or a twentieth of
+  // it if that is less. New segments are refused where they would not.
   std::int64_t min_free_bytes = std::int64_t{256} << 20;
   std::int64_t max_rigs = 10'000;
   // Compressed data of one rig's segments that stays only until it was reported

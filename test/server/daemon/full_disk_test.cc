@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the file system, a third of which a filler takes at first.
+// File systems, a third of which a filler takes at first.
 constexpr std::size_t kSmallBytes = 3 << 20;
 // A twentieth has room for the scores of what is stored.
 constexpr std::size_t kLargerBytes = 24 << 20;
