@@ -1,5 +1,6 @@
 #include "core/calibration/noise_weighting.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "core/calibration/noise_scales.h"
@@ -14,6 +15,8 @@ namespace {
 // fraction are treated as independent.
 constexpr double kLeastTrackNoise = 0.05;
 constexpr int kMaxReweightings = 4;
+// Least ratio of the noise of residuals to that of the weights.
+constexpr double kLeastResiduals = 0.3;
 
 constexpr double Square(double x) { return x * x; }
 
@@ -28,7 +31,7 @@ bool NoiseWeighting::Reweight() {
     const std::optional<Rig> next =
         selfcal::Reweight(stated_, point_->rig(), scales_);
     if (!next) break;
-    point_->WeightByNoise(*next);
+    point_->WeightByNoise(*next, ResidualsTo(*next));
     if (!descent_->Repeat()) return false;
   }
   return true;
@@ -46,6 +49,17 @@ bool NoiseWeighting::WeightByTracks() {
   return descent_->Repeat();
 }
 
+double NoiseWeighting::ResidualsTo(const Rig& weights) const {
+  for (const NoiseScale& scale : scales_) {
+    if (scale.kind != NoiseKind::kPixel || !scale.determined()) continue;
+    return std::clamp(
+        scale.factor * point_->rig().pixel_sigma_px / weights.pixel_sigma_px,
+        kLeastResiduals,
+        1.0);
+  }
+  return 1;
+}
+
 void NoiseWeighting::EstimateFactors() {
   const Eigen::MatrixXd basis = TangentBasis(point_->rig(), point_->subspace());
   // The noise scales require weights without the track noise.
@@ -54,7 +68,7 @@ void NoiseWeighting::EstimateFactors() {
   // Their estimation has its own linear system.
   point_->linearised().system.ReleaseChains();
   scales_ = EstimateNoiseScales(stated_,
-                                point_->Round(basis),
+                                point_->RoundOfNoise(basis),
                                 point_->estimate(),
                                 landmarks,
                                 track_noise_);

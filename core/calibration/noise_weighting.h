@@ -35,6 +35,9 @@ class NoiseWeighting {
  private:
   bool WeightByTracks();
   void EstimateFactors();
+  // The noise that residuals show, relative to that by which `weights` weights
+  // them; at most 1.
+  double ResidualsTo(const Rig& weights) const;
 
   const Rig& stated_;
   const CalibrateOptions& options_;

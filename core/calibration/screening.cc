@@ -105,7 +105,7 @@ struct Thresholds {
 };
 
 Thresholds FindThresholds(const LandmarkScene& scene,
-                          const CalibrateOptions& options,
+                          RobustLoss loss,
                           const CalibrationProblem& problem,
                           const std::vector<TrackPositions>& positions) {
   std::vector<double> norms_px;
@@ -125,11 +125,9 @@ Thresholds FindThresholds(const LandmarkScene& scene,
   }
   const double robust_sigmas = UpperMedian(std::move(norms_px)) /
                                kMedianOfRayleigh / scene.pixel_sigma_px();
-  return {{.kind = options.loss,
-           .scale = options.loss_scale,
-           .gate = std::max(kOutlierGate * std::max(1.0, robust_sigmas),
-                            2 * options.loss_scale)},
-          kMaxDepthUncertainty * UpperMedian(std::move(inverse_depths))};
+  loss.gate =
+      std::max(kOutlierGate * std::max(1.0, robust_sigmas), 2 * loss.scale);
+  return {loss, kMaxDepthUncertainty * UpperMedian(std::move(inverse_depths))};
 }
 
 double InverseDepthSigma(const Eigen::Matrix3d& information) {
@@ -180,10 +178,9 @@ std::optional<ScreenedLandmark> AssessLandmark(const LandmarkScene& scene,
 Screening Screen(const LandmarkScene& scene,
                  const BorderWeights& borders,
                  const CalibrationProblem& problem,
-                 const CalibrateOptions& options,
+                 const RobustLoss& loss,
                  const std::vector<TrackPositions>& positions) {
-  const Thresholds thresholds =
-      FindThresholds(scene, options, problem, positions);
+  const Thresholds thresholds = FindThresholds(scene, loss, problem, positions);
 
   Screening result;
   result.loss = thresholds.loss;
@@ -272,7 +269,7 @@ Screening ScreenLandmarks(const Rig& rig,
                           const CalibrationProblem& problem,
                           const std::vector<KeyframeState>& keyframes,
                           const KeyframeMotions& motions,
-                          const CalibrateOptions& options,
+                          const RobustLoss& loss,
                           const Screening* before) {
   const LandmarkScene scene(
       ChainThetas(theta, problem), keyframes, motions, rig.pixel_sigma_px);
@@ -299,7 +296,7 @@ Screening ScreenLandmarks(const Rig& rig,
   Screening result = Screen(scene,
                             BorderWeights(theta, rig.pixel_sigma_px),
                             problem,
-                            options,
+                            loss,
                             positions);
   result.screenings = screenings;
   if (before != nullptr) {

@@ -85,13 +85,13 @@ struct ReprojectionStatistics {
 // Triangulates tracks from their observations alone. However, a track that is
 // in `before`, with all of its observations within the gate there, starts from
 // the position there: the result is the same, at a much lower cost. The track
-// noise is that of `before`.
+// noise is that of `before`. The gate of the loss is found here.
 Screening ScreenLandmarks(const Rig& rig,
                           const Calibration& theta,
                           const CalibrationProblem& problem,
                           const std::vector<KeyframeState>& keyframes,
                           const KeyframeMotions& motions,
-                          const CalibrateOptions& options,
+                          const RobustLoss& loss,
                           const Screening* before);
 
 // Moves every landmark to the minimum over the used observations of its track.

@@ -83,9 +83,10 @@ MotionSegment SettleSegment(const Rig& rig,
                             const Calibration& theta,
                             const MotionSegment& segment) {
   const std::vector<const MotionSegment*> segments = {&segment};
-  const CalibrateOptions options;
   const CalibrationProblem problem = FlattenSegments(
-      rig, segments, PartitionSegments(segments, options.merge_landmarks));
+      rig,
+      segments,
+      PartitionSegments(segments, CalibrateOptions().merge_landmarks));
   const Eigen::Index size = TangentSize(theta);
   const Eigen::MatrixXd held(size, 0);
   CalibrationEstimate estimate{Eigen::VectorXd::Zero(size), problem.keyframes};
@@ -98,7 +99,7 @@ MotionSegment SettleSegment(const Rig& rig,
                                 problem,
                                 estimate.keyframes,
                                 motions,
-                                options,
+                                {},
                                 i == 0 ? nullptr : &screening);
     RefineOnWhatIsUsed(
         rig, theta, problem, estimate.keyframes, motions, &screening);

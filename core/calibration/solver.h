@@ -28,7 +28,7 @@ struct SolverRound {
   const std::vector<InertialMatrix>& whitening;
   // D x r: the directions in which d may move (SubspaceManifold).
   const Eigen::MatrixXd& basis;
-  const RobustLoss& loss;  // on reprojection residuals
+  RobustLoss loss;  // on reprojection residuals
   // Prior information about theta, centred at d = 0, D x D; null: no prior.
   const Eigen::MatrixXd* prior_information = nullptr;
   int threads = 1;  // of Ceres

@@ -35,7 +35,7 @@ std::optional<ThetaSubspace> HoldSpuriousDirections(
   const ThetaSubspace& subspace = point->subspace();
   if (subspace.estimated.cols() == 0) return std::nullopt;
   const Eigen::MatrixXd nothing = NoDirections(*point);
-  const SolverRound round = point->Round(nothing);
+  const SolverRound round = point->RoundOfNoise(nothing);
   point->linearised().system.ReleaseChains();  // each replica has its own
   const Eigen::MatrixXd& Lambda = point->information().Lambda;
   std::vector<Eigen::MatrixXd> under_noise;

@@ -16,7 +16,8 @@ WorkingPoint::WorkingPoint(const Rig& rig,
       reference_(options.prior ? options.prior->centre : theta_start),
       start_d_(BoxMinus(theta_start, reference_)),
       estimate_{start_d_, problem_.keyframes},
-      subspace_(WholeSubspace(rig)) {
+      subspace_(WholeSubspace(rig)),
+      loss_{.kind = options.loss, .scale = options.loss_scale} {
   SelectAfresh();
 }
 
@@ -31,6 +32,12 @@ SolverRound WorkingPoint::Round(const Eigen::MatrixXd& basis) const {
           .prior_information =
               options_.prior ? &options_.prior->information : nullptr,
           .threads = options_.threads};
+}
+
+SolverRound WorkingPoint::RoundOfNoise(const Eigen::MatrixXd& basis) const {
+  SolverRound round = Round(basis);
+  round.loss.scale = options_.loss_scale;
+  return round;
 }
 
 ReprojectionStatistics WorkingPoint::MeasureReprojections() const {
@@ -75,7 +82,7 @@ void WorkingPoint::SelectFrom(const Screening* before) {
   const Calibration at = theta();
   MeasureMotions(rig_, at, problem_, estimate_.keyframes, &motions_);
   screening_ = ScreenLandmarks(
-      rig_, at, problem_, estimate_.keyframes, motions_, options_, before);
+      rig_, at, problem_, estimate_.keyframes, motions_, loss_, before);
   RefineOnWhatIsUsed(
       rig_, at, problem_, estimate_.keyframes, motions_, &screening_);
   SetTrackNoise(track_noise_factor_, &screening_);
@@ -129,7 +136,7 @@ bool WorkingPoint::HoldAssessed(ThetaSubspace subspace) {
   return Linearise();
 }
 
-void WorkingPoint::WeightByNoise(const Rig& rig) {
+void WorkingPoint::WeightByNoise(const Rig& rig, double residuals) {
   for (BiasLink& link : problem_.bias_links) {
     link.sigmas.head<3>() *= rig.imu_noise.accel_bias_random_walk /
                              rig_.imu_noise.accel_bias_random_walk;
@@ -137,6 +144,7 @@ void WorkingPoint::WeightByNoise(const Rig& rig) {
                              rig_.imu_noise.gyro_bias_random_walk;
   }
   rig_ = rig;
+  loss_.scale = options_.loss_scale * residuals;
   reweighted_ = true;
   WeightByTracks(1);
 }

@@ -47,6 +47,9 @@ class WorkingPoint {
 
   // The problem of a round at this point; `basis` as of TangentBasis.
   SolverRound Round(const Eigen::MatrixXd& basis) const;
+  // The same with the loss of the options, which suits residuals of the noise
+  // by which it is weighted.
+  SolverRound RoundOfNoise(const Eigen::MatrixXd& basis) const;
   ReprojectionStatistics MeasureReprojections() const;
   // The cost without the weights for correlated tracks, which observations have
   // no longer from then on.
@@ -75,9 +78,10 @@ class WorkingPoint {
   // linearises.
   bool HoldAssessed(ThetaSubspace subspace);
 
-  // Weights by the noise of another rig; the correlation along tracks is to be
-  // measured again with it.
-  void WeightByNoise(const Rig& rig);
+  // Weights by the noise of another rig, with the loss of the options at
+  // `residuals` times the noise of its pixels: the noise that residuals show,
+  // if that is less. The correlation along tracks is to be measured again.
+  void WeightByNoise(const Rig& rig, double residuals);
   void WeightByTracks(double track_noise_factor);
 
   StepOutcome Step();  // from the linearisation
@@ -103,6 +107,7 @@ class WorkingPoint {
   bool reweighted_ = false;
   KeyframeMotions motions_;
   Screening screening_;
+  RobustLoss loss_;
   double track_noise_factor_ = 1;
   std::vector<InertialMatrix> whitening_;
   LinearisedRound linearised_;

@@ -105,7 +105,7 @@ class FirstRound {
                                    problem_,
                                    problem_.keyframes,
                                    motions_,
-                                   CalibrateOptions(),
+                                   {},
                                    nullptr)),
         whitening_(WhitenInertialLinks(
             rig_, rig_.factory, problem_, problem_.keyframes)),

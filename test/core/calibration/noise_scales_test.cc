@@ -23,6 +23,16 @@ double FactorOf(const CalibrationResult& result, NoiseKind kind) {
   return result.noise_scales.at(At(kind)).factor;
 }
 
+// Observations of one landmark in eight err, as if the focal length were
+// larger.
+void MoveOutwards(const Rig& rig, double error_px, MotionSegment* segment) {
+  for (Observation& seen : segment->observations) {
+    if (segment->landmarks[seen.landmark].id % 8 != 0) continue;
+    const Eigen::Vector2d centre = rig.factory.cameras[seen.camera].c;
+    seen.z_px += error_px * (seen.z_px - centre).normalized();
+  }
+}
+
 // The true noise is `off` times the assumed noise.
 void ExpectFound(const std::vector<NoiseKind>& kinds, double off) {
   const Rig truth = NoisyRig();
@@ -127,6 +137,31 @@ TEST(NoiseScales, OfTheImuAreRightWithTheErrorsOfATracker) {
   // Four standard deviations of these means.
   EXPECT_NEAR(gyro, 1, 0.05);
   EXPECT_NEAR(accel, 1, 0.05);
+}
+
+// Pixels are weighted by no less than 0.05 px, however small their noise is,
+// but a point that errs by as much has less weight than those that do not.
+TEST(NoiseScales, PointsThatErrByMoreThanOthersHaveLessWeight) {
+  constexpr int kSeeds = 4;
+  double squares = 0, components = 0;
+  for (std::uint64_t seed = 3; seed < 3 + kSeeds; ++seed) {
+    Rig rig = HandheldRig("r");
+    rig.pixel_sigma_px = 0.015;
+    std::vector<MotionSegment> segments = Walk(rig, 3, 40, 100, seed);
+    for (MotionSegment& segment : segments) {
+      MoveOutwards(rig, 6 * rig.pixel_sigma_px, &segment);
+    }
+    rig.pixel_sigma_px = 0.5;
+    const CalibrationResult result = CalibrateBelieving(rig, segments);
+    ASSERT_EQ(result.status, CalibrateStatus::kConverged);
+    const Eigen::VectorXd error = BoxMinus(result.theta, rig.factory);
+    for (const int i : FreeComponents(rig)) {
+      squares += error(i) * error(i) / result.covariance(i, i);
+      ++components;
+    }
+  }
+  // The limit of 95 % for independent components.
+  EXPECT_LT(squares, components + 1.96 * std::sqrt(2 * components));
 }
 
 // With the noise that the rig states, the data seems to say nothing about most
