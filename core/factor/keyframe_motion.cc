@@ -45,12 +45,13 @@ class Readings {
 
   using Reading = CorrectedReading<double>;
 
-  // Time of the next sample after (dt > 0) or before the given time, or dt if
-  // that is nearer.
-  double Next(double t_s, double dt_s) const {
-    const auto at = dt_s > 0 ? After(t_s) : Before(t_s);
-    if (at < 0 || at >= std::ssize(samples_)) return dt_s;
-    return dt_s > 0 ? std::min(Time(at), dt_s) : std::max(Time(at), dt_s);
+  // Time of the next sample from one time towards another, or that one if it is
+  // nearer.
+  double Next(double from_s, double to_s) const {
+    const bool forwards = to_s > from_s;
+    const auto at = forwards ? After(from_s) : Before(from_s);
+    if (at < 0 || at >= std::ssize(samples_)) return to_s;
+    return forwards ? std::min(Time(at), to_s) : std::max(Time(at), to_s);
   }
 
   Reading Interpolate(double t_s) const {

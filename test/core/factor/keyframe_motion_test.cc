@@ -153,6 +153,38 @@ TEST(MeasureMotion, MovesThePoseToEachRowOfARollingShutter) {
   }
 }
 
+// To the middle row and back, over the same samples: the first row or the last
+// one is exposed at the time of the keyframe, but for a rounding error of
+// either sign.
+TEST(MeasureMotion, OfARowAtTheKeyframesTimeIsNone) {
+  RandomValues random(11);
+  for (int trial = 0; trial < 100; ++trial) {
+    Scene scene(random);
+    for (ImuSample& sample : scene.samples) {
+      sample.gyro += random.Normal3(0.05);
+      sample.accel += random.Normal3(0.5);
+    }
+    CameraCalibration camera;
+    camera.height_px = 481;
+    const double readout_s = trial % 2 == 0 ? 0.03 : -0.03;
+    const double last_row_px = camera.height_px - 1;
+    camera.line_delay_s = readout_s / last_row_px;
+    for (const double row_px : {0.0, last_row_px}) {
+      for (const double off_s : {-1e-9, 1e-9}) {
+        camera.time_offset_s = off_s - *camera.line_delay_s * row_px;
+        const KeyframeMotion motion = MeasureMotion(
+            {scene.samples}, scene.x, scene.imu, {}, kGravity, camera);
+        const ExposurePose pose = MovePose(scene.x.q_GI,
+                                           scene.x.p_GI,
+                                           motion,
+                                           camera,
+                                           Eigen::Vector2d(7, row_px));
+        EXPECT_LT(ErrorPixels(pose, scene.x), 0.01);
+      }
+    }
+  }
+}
+
 // Samples for kImuPadding_s about a keyframe are as good as all of them, at
 // exposures up to 0.1 s before it and 0.135 s after it.
 TEST(MeasureMotion, NeedsNoSamplesBeyondThePadding) {
