@@ -32,8 +32,9 @@ namespace selfcal {
 // the noise that the rig states (`stated`), and those of the IMU near each
 // other: if only some are determined, the others follow.
 //
-// Call it at the end of a round, with `round` as it was solved, except that
-// `landmarks` are without the track noise. `track_noise` is the result of
+// Call it at the end of a round, with `round` as it was solved, except that its
+// loss suits residuals of the noise of round.rig, and that `landmarks` are
+// without the track noise. `track_noise` is the result of
 // TrackNoiseFactor (track_noise.h): if it exceeds the noise scale of pixels,
 // errors are correlated along tracks, and the reprojections are weighted by it
 // relative to all other factors. What is common to a track does not move one
