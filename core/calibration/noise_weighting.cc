@@ -15,7 +15,9 @@ namespace {
 // fraction are treated as independent.
 constexpr double kLeastTrackNoise = 0.05;
 constexpr int kMaxReweightings = 4;
-// Least ratio of the noise of residuals to that of the weights.
+// Least ratio of the noise of residuals to that of the weights: below it, most
+// residuals would be beyond the begin of the loss as soon as they show any of
+// the errors that the least noise of the weights stands for.
 constexpr double kLeastResiduals = 0.3;
 
 constexpr double Square(double x) { return x * x; }

@@ -12,8 +12,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/calibration/calibrate.h"
 #include "core/calibration/problem.h"
+#include "core/calibration/robust_loss.h"
 #include "core/calibration/triangulate.h"
 #include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"

@@ -99,7 +99,7 @@ MotionSegment SettleSegment(const Rig& rig,
                                 problem,
                                 estimate.keyframes,
                                 motions,
-                                {},
+                                RobustLoss(),
                                 i == 0 ? nullptr : &screening);
     RefineOnWhatIsUsed(
         rig, theta, problem, estimate.keyframes, motions, &screening);

@@ -107,7 +107,7 @@ class WorkingPoint {
   bool reweighted_ = false;
   KeyframeMotions motions_;
   Screening screening_;
-  RobustLoss loss_;
+  RobustLoss loss_;  // each selection finds its gate
   double track_noise_factor_ = 1;
   std::vector<InertialMatrix> whitening_;
   LinearisedRound linearised_;
