@@ -136,16 +136,15 @@ int EnsureRig(Context* context,
     return Fail(*context, status);
   }
   std::vector<Loss> losses;
-  auto recorded = ReadRecordedRig(input.rig,
-                                  input.from,
-                                  ModelNamed(input.camera_model),
-                                  first->recording.get(),
-                                  &losses);
+  auto recorded = ReadRecordedRig(
+      input.rig, input.from, ModelNamed(input.camera_model), *first, &losses);
   PrintLosses(losses);
   if (!recorded.ok()) return FailInput(recorded.status());
-  const int moved =
-      MoveToStart(input.recordings.temperature_c, first, &*recorded);
-  if (moved != kDone) return moved;
+  if (!first->map) {
+    const int moved =
+        MoveToStart(input.recordings.temperature_c, first, &*recorded);
+    if (moved != kDone) return moved;
+  }
   using RigService = v1::RigService::StubInterface;
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::CreateRigRequest request;
@@ -246,7 +245,7 @@ int Calibrate(Context* context, CalibrateInput input) {
         "{}: cannot be created: {}", state.string(), error.message())));
   }
   if (!input.rig.imu_rate_hz) {
-    input.rig.imu_rate_hz = ImuRate(*sessions->front().recording);
+    input.rig.imu_rate_hz = ImuRate(Readings(sessions->front()));
   }
   const auto daemon =
       DaemonProcess::Start(input.daemon.empty() ? FindDaemon() : input.daemon,
@@ -267,7 +266,8 @@ void AddCalibrate(CLI::App* app, Context* context) {
   CLI::App* command = app->add_subcommand(
       "calibrate",
       "Calibrate on recordings of images and readings: tracks features, "
-      "estimates the motion, keeps the most informative segments and "
+      "estimates the motion (a map of maplab has both), keeps the most "
+      "informative segments and "
       "calibrates on them; needs no daemon. A further call with the same "
       "--output continues. Exits with 0 if the result is good, with 5 if it is "
       "weak, with 1 if it is not trustworthy");

@@ -16,8 +16,8 @@
 #include "client/cli/diagnosis_text.h"
 #include "client/cli/error_lines.h"
 #include "client/cli/progress.h"
-#include "client/cli/recording_input.h"
 #include "client/cli/temperature_option.h"
+#include "client/cli/vi_map_input.h"
 #include "client/selfcal/client.h"
 #include "client/text/text.h"
 #include "core/preflight/diagnose.h"
@@ -30,7 +30,7 @@ namespace {
 
 struct ImportOptions {
   std::string rig;
-  RecordingInput recording;
+  ViMapInput map;
   std::optional<double> temperature_c;
   double timeout_s = 60;
 };
@@ -138,7 +138,7 @@ void WarnBeforeSending(Context* context,
   Rig rig;
   if (!FromProto(message, "", &rig).empty()) return;
   const auto theta =
-      ReadVersion(context, rig, options.recording.builder.calibration_version);
+      ReadVersion(context, rig, options.map.builder.calibration_version);
   if (theta) WarnOf(Diagnose(rig, *theta, segments));
 }
 
@@ -205,7 +205,7 @@ int SendSegments(Context* context,
 absl::Status CheckOrder(const ImportOptions& options) {
   namespace fs = std::filesystem;
   std::error_code error;
-  const std::string& folder = options.recording.folders.front();
+  const std::string& folder = options.map.folders.front();
   if (!fs::is_directory(options.rig, error) || fs::exists(folder, error)) {
     return absl::OkStatus();
   }
@@ -221,9 +221,9 @@ absl::Status CheckOrder(const ImportOptions& options) {
 int Import(Context* context, const ImportOptions& options) {
   const absl::Status ordered = CheckOrder(options);
   if (!ordered.ok()) return FailInput(ordered);
-  auto recording = ReadRecording(options.recording);
-  if (!recording.ok()) return FailInput(recording.status());
-  for (MotionSegment& segment : recording->segments) {
+  auto map = ReadViMapSegments(options.map);
+  if (!map.ok()) return FailInput(map.status());
+  for (MotionSegment& segment : map->segments) {
     segment.temperature_c = options.temperature_c;
   }
   // Fails at once if the rig does not exist; the stream would only report it
@@ -231,8 +231,8 @@ int Import(Context* context, const ImportOptions& options) {
   v1::Rig rig;
   const grpc::Status found = ReadDevice(context, options.rig, &rig);
   if (!found.ok()) return Fail(*context, found);
-  WarnBeforeSending(context, rig, options, recording->segments);
-  return SendSegments(context, options, std::move(recording->segments));
+  WarnBeforeSending(context, rig, options, map->segments);
+  return SendSegments(context, options, std::move(map->segments));
 }
 
 }  // namespace
@@ -245,9 +245,9 @@ CLI::App* AddImport(CLI::App* parent,
       "Cut maplab VI-maps into segments and send them; returns when all are "
       "acknowledged");
   const auto options = std::make_shared<ImportOptions>();
-  SegmentBuilderOptions& builder = options->recording.builder;
+  SegmentBuilderOptions& builder = options->map.builder;
   command->add_option("RIG", options->rig)->required();
-  AddRecordingOptions(command, &options->recording);
+  AddViMapOptions(command, &options->map);
   command->add_option(
       "--session", builder.session, "Name of the session [the mission's id]");
   command

@@ -13,8 +13,8 @@
 #include "client/cli/diagnosis_text.h"
 #include "client/cli/error_lines.h"
 #include "client/cli/preflight_subject.h"
-#include "client/cli/recording_input.h"
 #include "client/cli/rig_input.h"
+#include "client/cli/vi_map_input.h"
 #include "core/preflight/diagnose.h"
 #include "proto/convert.h"
 
@@ -22,7 +22,7 @@ namespace selfcal::client {
 namespace {
 
 struct PreflightOptions {
-  RecordingInput recording;
+  ViMapInput map;
   std::string rig_file;  // empty: use the sensors of the map
   std::string device;    // rig of the daemon, instead of a recording
   int newest = 20;       // number of its segments to check
@@ -48,11 +48,11 @@ absl::StatusOr<Rig> ReadRigFile(const std::string& file) {
   return rig;
 }
 
-absl::Status FromRecording(const PreflightOptions& options,
-                           PreflightSubject* subject) {
-  auto recording = ReadRecording(options.recording);
-  if (!recording.ok()) return recording.status();
-  subject->rig = recording->rig;
+absl::Status FromViMap(const PreflightOptions& options,
+                       PreflightSubject* subject) {
+  auto map = ReadViMapSegments(options.map);
+  if (!map.ok()) return map.status();
+  subject->rig = map->rig;
   if (!options.rig_file.empty()) {
     auto read = ReadRigFile(options.rig_file);
     if (!read.ok()) return read.status();
@@ -62,14 +62,14 @@ absl::Status FromRecording(const PreflightOptions& options,
     return Invalid("the map's sensors.yaml", violations);
   }
   subject->theta = subject->rig.factory;
-  subject->segments = std::move(recording->segments);
+  subject->segments = std::move(map->segments);
   return absl::OkStatus();
 }
 
 int Preflight(Context* context, const PreflightOptions& options) {
   PreflightSubject subject;
   if (options.device.empty()) {
-    const absl::Status read = FromRecording(options, &subject);
+    const absl::Status read = FromViMap(options, &subject);
     if (!read.ok()) return FailInput(read);
   } else {
     const grpc::Status read =
@@ -99,7 +99,7 @@ CLI::App* AddPreflight(CLI::App* parent,
       "extrinsics, focal length, landmarks. Exits with 0 if nothing is found, "
       "otherwise with 1");
   const auto options = std::make_shared<PreflightOptions>();
-  AddRecordingOptions(preflight, &options->recording);
+  AddViMapOptions(preflight, &options->map);
   CLI::Option* const folders = preflight->get_option("DIR")->required(false);
   CLI::Option* const rig = preflight->add_option(
       "--rig",
@@ -123,7 +123,7 @@ CLI::App* AddPreflight(CLI::App* parent,
       ->capture_default_str()
       ->needs(device);
   preflight->callback([context, options] {
-    if (options->device.empty() && options->recording.folders.empty()) {
+    if (options->device.empty() && options->map.folders.empty()) {
       throw CLI::RequiredError("DIR or --device");
     }
     context->command = [context, options] {

@@ -123,8 +123,7 @@ void AddTolerances(const v1::Rig& rig,
 
 }  // namespace
 
-double ImuRate(const Recording& recording) {
-  const std::vector<ImuSample>& imu = recording.imu();
+double ImuRate(std::span<const ImuSample> imu) {
   std::vector<std::int64_t> steps_ns;
   for (std::size_t i = 1; i < imu.size(); ++i) {
     steps_ns.push_back(imu[i].t_ns - imu[i - 1].t_ns);
@@ -137,11 +136,14 @@ absl::StatusOr<RecordedRig> ReadRecordedRig(
     RigInput input,
     const std::vector<std::string>& from,
     DistortionModel guessed,
-    Recording* recording,
+    const RecordedSession& session,
     std::vector<Loss>* losses) {
   RecordedRig result;
-  if (from.empty()) {
-    auto stated = StatedBy(recording, input.extrinsics, guessed, losses);
+  if (from.empty() && session.map) {
+    input.base = session.map->rig;
+  } else if (from.empty()) {
+    auto stated =
+        StatedBy(session.recording.get(), input.extrinsics, guessed, losses);
     if (!stated.ok()) return stated.status();
     input.base = std::move(stated->rig);
     result.unknown = std::move(stated->unknown);

@@ -5,19 +5,20 @@
 
 #include <absl/status/statusor.h>
 
+#include <span>
 #include <string>
 #include <vector>
 
+#include "client/cli/recorded_sessions.h"
 #include "client/cli/rig_input.h"
 #include "client/odometry/start.h"
-#include "client/recording/recording.h"
 #include "core/model/camera.h"
 #include "selfcal/v1/rig.pb.h"
 
 namespace selfcal::client {
 
-// Median rate of the readings [Hz].
-double ImuRate(const Recording& recording);
+// Median rate of readings [Hz].
+double ImuRate(std::span<const ImuSample> imu);
 
 struct RecordedRig {
   v1::Rig rig;
@@ -28,15 +29,15 @@ struct RecordedRig {
 // the image's width for the principal point, 3 degrees, 5 cm, and 50 ms for the
 // time offset, which is estimated unless the input switches it off. `from` has
 // the tool and its files, or nothing: then the calibration is what the
-// recording states. A camera without one is guessed: of the model `guessed`, as
-// that is usual, with a focal length from the width of the image, to 30 %; one
-// without a pose is in the IMU, to 10 cm. Errors are those of ReadRig and of
-// images.
+// recording states, or that of a map. A camera without one is guessed: of the
+// model `guessed`, as that is usual, with a focal length from the width of the
+// image, to 30 %; one without a pose is in the IMU, to 10 cm. Errors are those
+// of ReadRig and of images.
 absl::StatusOr<RecordedRig> ReadRecordedRig(
     RigInput input,
     const std::vector<std::string>& from,
     DistortionModel guessed,
-    Recording* recording,
+    const RecordedSession& session,
     std::vector<Loss>* losses);
 
 }  // namespace selfcal::client

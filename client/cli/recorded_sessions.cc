@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <utility>
 
 #include "client/cli/context.h"
 #include "client/cli/positive_number.h"
 #include "client/cli/temperature_option.h"
+#include "client/import/vi_map.h"
 
 namespace selfcal::client {
 namespace {
@@ -28,15 +30,66 @@ std::string NameOf(const std::string& path) {
   return name.empty() ? "recording" : name;
 }
 
+std::string SessionName(const std::string& path, std::int64_t first_ns) {
+  return fmt::format("{}-{}", NameOf(path), first_ns / 1'000'000);
+}
+
+absl::StatusOr<RecordedSession> OpenMap(const std::string& path,
+                                        const RecordingsInput& input) {
+  ViMapInput map;
+  map.folders = {path};
+  map.builder.keyframes = input.keyframes;
+  auto read = ReadViMapSegments(map);
+  if (!read.ok()) return read.status();
+  RecordedSession session;
+  session.name =
+      SessionName(path, read->segments.front().keyframes.front().t_ns);
+  for (MotionSegment& segment : read->segments) {
+    segment.key.session = session.name;
+    segment.temperature_c = input.temperature_c;
+  }
+  session.map = *std::move(read);
+  return session;
+}
+
+absl::StatusOr<RecordedSession> OpenSession(const std::string& path,
+                                            const RecordingsInput& input) {
+  if (IsViMap(path)) return OpenMap(path, input);
+  auto recording = OpenRecording(path, input.topics);
+  if (!recording.ok()) return recording.status();
+  for (const std::string& problem : (*recording)->problems()) {
+    PrintError(problem);
+  }
+  if (const auto differences = StampDifferences(**recording)) {
+    PrintError(fmt::format("{}: {}", path, *differences));
+  }
+  RecordedSession session;
+  session.name =
+      SessionName(path, (*recording)->cameras().front().image_times_ns.front());
+  session.recording = *std::move(recording);
+  return session;
+}
+
 }  // namespace
+
+int CameraCount(const RecordedSession& session) {
+  return static_cast<int>(session.map ? session.map->rig.factory.cameras.size()
+                                      : session.recording->cameras().size());
+}
+
+std::span<const ImuSample> Readings(const RecordedSession& session) {
+  if (session.map) return session.map->segments.front().imu;
+  return session.recording->imu();
+}
 
 void AddRecordingsOptions(CLI::App* command, RecordingsInput* input) {
   command
       ->add_option("RECORDING",
                    input->paths,
                    "A bag of ROS 1 or ROS 2 (MCAP, SQLite), a folder in the "
-                   "format of EuRoC or TUM-VI, or a folder of images with "
-                   "cam0.csv and imu.csv; each is a session")
+                   "format of EuRoC or TUM-VI, a folder of images with "
+                   "cam0.csv and imu.csv, a folder of tracks with tracks.csv "
+                   "and imu.csv, or a VI-map of maplab; each is a session")
       ->required();
   command
       ->add_option("--camera-topic",
@@ -53,7 +106,8 @@ void AddRecordingsOptions(CLI::App* command, RecordingsInput* input) {
   command
       ->add_option("--keyframe-rate",
                    input->keyframe_rate_hz,
-                   "Keyframes are at most so many in a second [Hz]")
+                   "Keyframes are at most so many in a second, but for those "
+                   "of a map [Hz]")
       ->check(AboveZero())
       ->capture_default_str();
   AddTemperature(command,
@@ -65,21 +119,11 @@ absl::StatusOr<std::vector<RecordedSession>> OpenSessions(
     const RecordingsInput& input) {
   std::vector<RecordedSession> sessions;
   for (const std::string& path : input.paths) {
-    auto recording = OpenRecording(path, input.topics);
-    if (!recording.ok()) return recording.status();
-    for (const std::string& problem : (*recording)->problems()) {
-      PrintError(problem);
-    }
-    if (const auto differences = StampDifferences(**recording)) {
-      PrintError(fmt::format("{}: {}", path, *differences));
-    }
-    const std::string name = fmt::format(
-        "{}-{}",
-        NameOf(path),
-        (*recording)->cameras().front().image_times_ns.front() / 1'000'000);
-    sessions.push_back({name, *std::move(recording), false});
-    const std::size_t cameras = sessions.back().recording->cameras().size();
-    const std::size_t first = sessions.front().recording->cameras().size();
+    auto session = OpenSession(path, input);
+    if (!session.ok()) return session.status();
+    sessions.push_back(*std::move(session));
+    const int cameras = CameraCount(sessions.back());
+    const int first = CameraCount(sessions.front());
     if (cameras != first) {
       return absl::InvalidArgumentError(
           fmt::format("{} has {} cameras and {} has {}: recordings of one "

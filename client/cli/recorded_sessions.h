@@ -1,4 +1,5 @@
-// The recordings on the command line.
+// The recordings on the command line: images or tracks, with readings, and maps
+// of maplab.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -6,9 +7,11 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "client/cli/vi_map_input.h"
 #include "client/recording/recording.h"
 
 namespace selfcal::client {
@@ -23,9 +26,16 @@ struct RecordingsInput {
 
 struct RecordedSession {
   std::string name;
+  // One of these is there. A map has states that a SLAM system estimated, so
+  // that neither a start nor the motion is looked for.
   std::unique_ptr<Recording> recording;
+  std::optional<ViMapSegments> map;
   bool clocks_agree = false;  // after AlignClocks (clock_alignment.h)
 };
+
+int CameraCount(const RecordedSession& session);
+// Readings of the session; of a map those of its first segment.
+std::span<const ImuSample> Readings(const RecordedSession& session);
 
 // Adds RECORDING..., --camera-topic, --imu-topic, --keyframes, --keyframe-rate
 // and --temperature. `input` must outlive the command.
@@ -33,7 +43,7 @@ void AddRecordingsOptions(CLI::App* command, RecordingsInput* input);
 
 // Opens all recordings, and prints what was left out of them. A session has the
 // name of its file, without folder and ending, and the time of the first image
-// [ms]: another recording of the same name is another session.
+// or keyframe [ms]: another recording of the same name is another session.
 // INVALID_ARGUMENT for recordings with different numbers of cameras.
 absl::StatusOr<std::vector<RecordedSession>> OpenSessions(
     const RecordingsInput& input);

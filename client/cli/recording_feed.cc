@@ -29,6 +29,13 @@ using RecalibrationService = v1::RecalibrationService::StubInterface;
 constexpr std::chrono::milliseconds kPollEvery{20};
 constexpr std::chrono::seconds kAcknowledgement{60};
 
+// Position in a session, for its progress bar.
+struct Place {
+  std::size_t done = 0;
+  std::size_t of = 0;
+  const char* unit = "";
+};
+
 class Feed {
  public:
   Feed(Context* context,
@@ -48,7 +55,6 @@ class Feed {
                 [this](const Acknowledgement& ack) { OnAck(ack); }) {}
 
   int Run() {
-    Recording* const recording = session_->recording.get();
     DeviceVersion active;
     v1::Segment last;
     grpc::Status status = ReadActive(&active);
@@ -60,15 +66,38 @@ class Feed {
                             &last);
     }
     if (!status.ok()) return Fail(*context_, status);
-    if (active.rig.factory.cameras.size() != recording->cameras().size()) {
+    const auto cameras = static_cast<std::size_t>(CameraCount(*session_));
+    if (active.rig.factory.cameras.size() != cameras) {
       return FailInput(absl::InvalidArgumentError(
           fmt::format("the recording has {} cameras and the rig '{}' has {}; "
                       "name the topics of its cameras with --camera-topic, or "
                       "choose cameras of the calibration with --cameras",
-                      recording->cameras().size(),
+                      cameras,
                       rig_,
                       active.rig.factory.cameras.size())));
     }
+    const auto name = ParseSegmentName(last.name());
+    counts_->continued = counts_->continued || name;
+    return session_->map ? SendMap(name ? name->key.index : -1)
+                         : Track(std::move(active), last);
+  }
+
+ private:
+  // Sends the segments of a map that come after that with the index `last`.
+  int SendMap(std::int64_t last) {
+    const std::vector<MotionSegment>& all = session_->map->segments;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (all[i].key.index <= last) continue;
+      const Place place = {i + 1, all.size(), "segments"};
+      Show(place, "");
+      if (const int code = Take(all[i], place); code != kDone) return code;
+    }
+    progress_.Clear();
+    return kDone;
+  }
+
+  // Tracks what comes after the segment `last`.
+  int Track(DeviceVersion active, const v1::Segment& last) {
     const absl::Status aligned = AlignClocks(active.theta, {}, session_);
     if (!aligned.ok()) return FailInput(aligned);
     OdometryOptions odometry{.session = session_->name,
@@ -76,21 +105,26 @@ class Feed {
                              .keyframes = input_.keyframes,
                              .temperature_c = input_.temperature_c};
     if (const auto name = ParseSegmentName(last.name())) {
-      counts_->continued = true;
       // Not joined to the segment before: its motion is not known here.
       odometry.first_index = name->key.index + 2;
       odometry.after_ns = last.end_ns();
     }
-    Odometry source(recording, active.rig, active.theta, odometry);
+    Odometry source(
+        session_->recording.get(), active.rig, active.theta, odometry);
     for (;;) {
       auto next = source.Next(active.theta, active.message.version());
       if (!next.ok()) return FailInput(next.status());
       if (!*next) break;
-      Show(source.progress(), "");
-      if (const int code = Take(**next, source.progress()); code != kDone) {
+      const Place place = {
+          source.progress().images, source.progress().of, "images"};
+      Show(place, "");
+      if (!(*next)->failure.empty()) {
+        Leave((*next)->segment.key, (*next)->failure);
+      } else if (const int code = Take((*next)->segment, place);
+                 code != kDone) {
         return code;
       }
-      status = ReadActive(&active);
+      const grpc::Status status = ReadActive(&active);
       if (!status.ok()) return Fail(*context_, status);
     }
     const OdometryProgress& end = source.progress();
@@ -104,7 +138,6 @@ class Feed {
     return kDone;
   }
 
- private:
   ClientOptions Connection() const {
     ClientOptions client = context_->Connection();
     client.rig = rig_;
@@ -112,10 +145,11 @@ class Feed {
     return client;
   }
 
-  void Show(const OdometryProgress& at, const std::string& note) {
-    progress_.Show(at.images,
-                   at.of,
-                   fmt::format("images, {} segments{}", counts_->sent, note));
+  void Show(const Place& at, const std::string& note) {
+    progress_.Show(
+        at.done,
+        at.of,
+        fmt::format("{}, {} segments{}", at.unit, counts_->sent, note));
   }
 
   grpc::Status ReadActive(DeviceVersion* active) {
@@ -123,12 +157,8 @@ class Feed {
   }
 
   // Sends a segment and waits for what the daemon does with it.
-  int Take(const OdometrySegment& one, const OdometryProgress& at) {
-    if (!one.failure.empty()) {
-      Leave(one.segment.key, one.failure);
-      return kDone;
-    }
-    if (!stream_.Send(one.segment)) {
+  int Take(const MotionSegment& segment, const Place& at) {
+    if (!stream_.Send(segment)) {
       return FailInput(absl::ResourceExhaustedError(
           "the segment cannot be sent: the queue is full"));
     }
@@ -143,12 +173,12 @@ class Feed {
                                        : connection.message())});
     }
     if (const std::string reason = TakeRejection(); !reason.empty()) {
-      Leave(one.segment.key, reason);
+      Leave(segment.key, reason);
       return kDone;
     }
     ++counts_->sent;
     Show(at, "");
-    grpc::Status status = WaitForScore(one.segment.key);
+    grpc::Status status = WaitForScore(segment.key);
     if (status.ok()) status = WaitForRun(at);
     return status.ok() ? kDone : Fail(*context_, status);
   }
@@ -174,7 +204,7 @@ class Feed {
     }
   }
 
-  grpc::Status WaitForRun(const OdometryProgress& at) {
+  grpc::Status WaitForRun(const Place& at) {
     for (;;) {
       v1::Recalibration run;
       const grpc::Status status = ReadNewestRun(runs_.get(), rig_, &run);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <system_error>
 #include <unordered_map>
 #include <utility>
 
@@ -323,6 +324,14 @@ absl::StatusOr<ViMapRecording> ReadViMaps(
     }
   }
   return result;
+}
+
+bool IsViMap(const std::string& folder) {
+  std::error_code error;
+  const std::filesystem::path path(folder);
+  return std::filesystem::exists(path / "vi_map_metadata", error) ||
+         std::filesystem::is_directory(path / "vi_map", error) ||
+         std::filesystem::is_directory(path / "submap_0" / "vi_map", error);
 }
 
 absl::StatusOr<ViMapRecording> ReadViMap(const std::string& folder,

@@ -274,18 +274,83 @@ class Calibrate(unittest.TestCase):
         self.assertEqual(len(listed.stdout.splitlines()), 5)
 
 
+def real_recording(test: unittest.TestCase, name: str) -> pathlib.Path:
+    data = os.environ.get(
+        "SELFCAL_TEST_DATA",
+        pathlib.Path(__file__).parents[4] / "shared/data",
+    )
+    recording = pathlib.Path(data) / name
+    if not recording.exists():
+        test.skipTest(f"no recordings beside the checkout: {recording}")
+    return recording
+
+
+class Map(unittest.TestCase):
+    """A map of maplab: states and tracks of a SLAM system, which are used as
+    they are."""
+
+    def test_from_a_map_to_files(self) -> None:
+        recording = real_recording(self, "euroc_v1_01")
+        folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, folder)
+        output = folder / "output"
+        done = calibrate(recording, output, "--temperature", "21")
+        # One keyframe a second: three segments, too few to confirm anything.
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("3 segments stored, 0 left out", done.stderr)
+        self.assertIn("too few segments to confirm", done.stderr)
+        self.assertFalse((output / "calibration.json").exists())
+
+        again = calibrate(recording, output)
+        self.assertEqual(again.returncode, 1, again.stderr)
+        self.assertIn("0 segments stored, 0 left out", again.stderr)
+
+        # The segments are those of an import.
+        daemon = RunningDaemon(SELFCALD, f"{output}/state")
+        self.addCleanup(daemon.stop)
+        target = [SELFCAL, "--target", daemon.target, "--json"]
+        for line in (
+            ["rig", "create", "--vi-map", recording, "--id", "imported"],
+            ["segment", "import", "imported", recording],
+        ):
+            subprocess.run([*target, *line], check=True, capture_output=True)
+        listed = {}
+        for rig in "device", "imported":
+            shown = subprocess.run(
+                [*target, "segment", "list", rig],
+                capture_output=True,
+                text=True,
+                check=True,
+            )
+            listed[rig] = json.loads(shown.stdout)["segments"]
+        for name in "start_ns", "end_ns", "keyframes":
+            self.assertEqual(
+                *([one[name] for one in some] for some in listed.values())
+            )
+        self.assertEqual(
+            [one["temperature_c"] for one in listed["device"]], [21] * 3
+        )
+
+    def test_a_map_that_is_too_short(self) -> None:
+        recording = real_recording(self, "equidistant_room")
+        folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, folder)
+        done = calibrate(recording, folder, "--keyframes", "2000")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn(
+            f"{recording} is too short for one segment", done.stderr
+        )
+        inner = calibrate(recording / "vi_map", folder)
+        self.assertEqual(inner.returncode, 2)
+        self.assertIn("name a VI-map folder", inner.stderr)
+
+
 class RealImages(unittest.TestCase):
     """Five seconds of a drone that hardly moves: no calibration follows, and
     no component is far less certain than it was before."""
 
     def test_says_that_there_is_too_little_motion(self) -> None:
-        data = os.environ.get(
-            "SELFCAL_TEST_DATA",
-            pathlib.Path(__file__).parents[4] / "shared/data",
-        )
-        images = pathlib.Path(data) / "euroc_images"
-        if not images.exists():
-            self.skipTest(f"no recordings beside the checkout: {images}")
+        images = real_recording(self, "euroc_images")
         folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, folder)
         done = calibrate(images, folder / "output")

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string>
 
-#include "client/cli/recording_input.h"
+#include "client/cli/vi_map_input.h"
 #include "client/import/vi_map.h"
 #include "test/client/cli/commands_fixture.h"
 #include "test/recordings.h"
@@ -92,9 +92,9 @@ TEST_F(PreflightCommand, ExitsWithTwoForWhatItCannotRead) {
 // The segments that the daemon keeps of the device, as the recording has them.
 TEST_F(PreflightCommand, LooksAtWhatADeviceHasSent) {
   SELFCAL_NEED_RECORDING(map, "tango_handheld");
-  RecordingInput input;
+  ViMapInput input;
   input.folders = {map};
-  const auto recording = ReadRecording(input);
+  const auto recording = ReadViMapSegments(input);
   ASSERT_TRUE(recording.ok()) << recording.status();
   Rig rig = recording->rig;
   rig.id = "device";

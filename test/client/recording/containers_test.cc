@@ -342,6 +342,14 @@ TEST_F(BrokenBag, OtherFilesAreNoRecordings) {
                   ": not a recording: neither a bag of ROS 1 nor MCAP nor "
                   "SQLite");
   }
+  for (const std::string lines :
+       {"# timestamp tx ty tz qx qy qz qw\n1403715273.26 1 2 3 0 0 0 1\n",
+        "1403715273262142976,1,2,3,1,0,0,0,0.1,0.2,0.3\n"}) {
+    EXPECT_EQ(Error(Write("file", lines)),
+              folder_.File("file") +
+                  ": a trajectory, which has neither images nor tracks: name "
+                  "the recording from which it was estimated");
+  }
   EXPECT_EQ(Error(Write("file", "#ROSBAG V1.2\n")),
             folder_.File("file") +
                 ": a bag of version 1: only version 2.0, of 2010, is read");

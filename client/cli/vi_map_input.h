@@ -1,4 +1,4 @@
-// The recording that a command reads, and the options for reading it.
+// Segments of a VI-map on the command line, and the options for cutting it.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -14,23 +14,23 @@
 
 namespace selfcal::client {
 
-struct RecordingInput {
+struct ViMapInput {
   std::vector<std::string> folders;
   SegmentBuilderOptions builder;
   bool all_landmarks = false;
 };
 
-struct RecordedSegments {
+struct ViMapSegments {
   Rig rig;  // from the sensors of the map, id empty
   std::vector<MotionSegment> segments;
 };
 
 // Adds DIR..., --keyframes, --seconds, --min-observations and --all-landmarks.
 // `input` must outlive the command.
-void AddRecordingOptions(CLI::App* command, RecordingInput* input);
+void AddViMapOptions(CLI::App* command, ViMapInput* input);
 
-// Reads the recording. Errors name the file; INVALID_ARGUMENT also if the
-// recording is too short for one segment.
-absl::StatusOr<RecordedSegments> ReadRecording(const RecordingInput& input);
+// Reads the map and cuts it into segments, at least one. Errors name the file;
+// INVALID_ARGUMENT also for a map that is too short for one segment.
+absl::StatusOr<ViMapSegments> ReadViMapSegments(const ViMapInput& input);
 
 }  // namespace selfcal::client

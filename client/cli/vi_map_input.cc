@@ -1,4 +1,6 @@
-#include "client/cli/recording_input.h"
+#include "client/cli/vi_map_input.h"
+
+#include <fmt/format.h>
 
 #include <utility>
 
@@ -6,7 +8,7 @@
 
 namespace selfcal::client {
 
-void AddRecordingOptions(CLI::App* command, RecordingInput* input) {
+void AddViMapOptions(CLI::App* command, ViMapInput* input) {
   SegmentBuilderOptions& builder = input->builder;
   command
       ->add_option("DIR",
@@ -31,7 +33,7 @@ void AddRecordingOptions(CLI::App* command, RecordingInput* input) {
                     "Also use landmarks that the map does not mark as good");
 }
 
-absl::StatusOr<RecordedSegments> ReadRecording(const RecordingInput& input) {
+absl::StatusOr<ViMapSegments> ReadViMapSegments(const ViMapInput& input) {
   ViMapOptions options;
   options.good_landmarks_only = !input.all_landmarks;
   absl::StatusOr<ViMapRecording> recording =
@@ -40,12 +42,13 @@ absl::StatusOr<RecordedSegments> ReadRecording(const RecordingInput& input) {
   if (!recording.ok()) return recording.status();
   SegmentBuilderOptions builder = input.builder;
   if (builder.session.empty()) builder.session = recording->session;
-  RecordedSegments result;
+  ViMapSegments result;
   result.segments = BuildSegments(*recording, builder);
   result.rig = std::move(recording->rig);
   if (result.segments.empty()) {
     return absl::InvalidArgumentError(
-        "the recording is too short for one segment; give fewer --keyframes");
+        fmt::format("{} is too short for one segment; give fewer --keyframes",
+                    input.folders.front()));
   }
   return result;
 }
