@@ -324,6 +324,12 @@ const tests = {
     assert.match(before, /\d % smaller/);
     assert.equal(await r.page.locator('.advice').getAttribute('aria-live'), 'polite');
     assert.equal(await r.page.locator('tbody tr').count(), 14);
+    // The plan is that of the command line.
+    const { lessons } = await r.api('rigs/headset:adviseMotion');
+    assert.ok(lessons.length > 0);
+    await r.sees('To be recorded');
+    assert.equal(await r.page.locator('.plan > li > strong').count(), lessons.length);
+    for (const lesson of lessons) await r.sees(lesson.instruction);
     await r.picture('coach');
     await r.detail('coach');
     await send([daemon.address, 'headset', 'carried', '6']);

@@ -4,6 +4,7 @@ import { pageOf, rigPath } from '../api';
 import type {
   AdviseMotionResponse,
   AdviseMotionResponse_Advice,
+  AdviseMotionResponse_MissingDirection,
   AdviseMotionResponse_WeakDirection,
 } from '../contract';
 import { component, number, shownUnit, sigmaText, words } from '../format';
@@ -55,6 +56,77 @@ function Best(props: { of: AdviseMotionResponse_Advice; seconds: number }) {
         </p>
       )}
     </div>
+  );
+}
+
+// Directions that are listed for a lesson; the least known come first.
+const kShownDirections = 3;
+// The part of the name of a block that is the slope of another one.
+const kSlope = '_slope';
+
+function percent(part: number): string {
+  return (100 * part).toFixed(part < 0.1 ? 1 : 0) + ' %';
+}
+
+function Directions(props: { of: AdviseMotionResponse_MissingDirection[]; taught: boolean }) {
+  const more = props.of.length - kShownDirections;
+  return (
+    <ul>
+      {props.of.slice(0, kShownDirections).map((missing) => (
+        <li key={missing.words}>
+          {missing.words}: {percent(missing.sigmaByPrior)}
+          {props.taught && ' to ' + percent(missing.sigmaByPriorAfter)}
+        </li>
+      ))}
+      {more > 0 && <li>and {more} more</li>}
+    </ul>
+  );
+}
+
+// What has to be recorded until no direction is missing, as `selfcal rig coach`
+// prints it.
+function Plan(props: { of: AdviseMotionResponse }) {
+  const { lessons, missing } = props.of;
+  const untaught = missing.filter((m) => m.motion === '');
+  const isSlope = (m: AdviseMotionResponse_MissingDirection) =>
+    m.parts.some((part) => part.component.includes(kSlope));
+  const slopes = untaught.filter(isSlope);
+  const rest = untaught.filter((m) => !isSlope(m));
+  return (
+    <>
+      <h2>To be recorded</h2>
+      {missing.length === 0 ? (
+        <p>
+          No direction is missing
+          {lessons.length > 0 && ', but there are too few segments to confirm a calibration'}.
+        </p>
+      ) : (
+        <p class="quiet">
+          {missing.length} {missing.length === 1 ? 'direction is' : 'directions are'} missing:
+          standard deviations in percent of those before any data, now and after all of this.
+        </p>
+      )}
+      <ol class="plan">
+        {lessons.map((lesson) => (
+          <li key={lesson.motion}>
+            <strong>{number(lesson.seconds)} s:</strong> {lesson.instruction}
+            <Directions of={missing.filter((m) => m.motion === lesson.motion)} taught />
+          </li>
+        ))}
+        {slopes.length > 0 && (
+          <li>
+            The same at temperatures 20 K or more apart:
+            <Directions of={slopes} taught={false} />
+          </li>
+        )}
+        {rest.length > 0 && (
+          <li>
+            No motion teaches these: hold them fixed, or state them better.
+            <Directions of={rest} taught={false} />
+          </li>
+        )}
+      </ol>
+    </>
   );
 }
 
@@ -161,6 +233,7 @@ export function CoachPage(props: { rig: string; version: number }) {
             the tables that it does not use; updates when segments arrive.
             {read.busy && ' Updating ...'}
           </p>
+          <Plan of={coaching} />
           <Weakest of={coaching.weakest} />
           <Motions of={coaching} />
         </>
