@@ -337,9 +337,7 @@ class Map(unittest.TestCase):
         self.addCleanup(shutil.rmtree, folder)
         done = calibrate(recording, folder, "--keyframes", "2000")
         self.assertEqual(done.returncode, 2)
-        self.assertIn(
-            f"{recording} is too short for one segment", done.stderr
-        )
+        self.assertIn(f"{recording} is too short for one segment", done.stderr)
         inner = calibrate(recording / "vi_map", folder)
         self.assertEqual(inner.returncode, 2)
         self.assertIn("name a VI-map folder", inner.stderr)
