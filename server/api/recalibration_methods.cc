@@ -55,8 +55,8 @@ absl::StatusOr<v1::Recalibration> GetRecalibration(
   return EncodeWithConvergence(context.store, *run);
 }
 
-// The versions that the runs made, but damaged ones.
-absl::StatusOr<std::map<VersionId, StoredCalibration>> VersionsOf(
+// The reports of the versions that the runs made, but damaged ones.
+absl::StatusOr<std::map<VersionId, StoredCalibration>> ReportsOf(
     Store* store, const std::vector<StoredRun>& runs) {
   std::vector<VersionId> ids;
   for (const StoredRun& run : runs) {
@@ -65,13 +65,13 @@ absl::StatusOr<std::map<VersionId, StoredCalibration>> VersionsOf(
     }
   }
   SELFCAL_ASSIGN_OR_RETURN(std::vector<StoredCalibration> read,
-                           store->GetCalibrations(ids));
-  std::map<VersionId, StoredCalibration> versions;
-  for (StoredCalibration& version : read) {
-    VersionId id(version.rig, version.version);
-    versions.emplace(std::move(id), std::move(version));
+                           store->GetReports(ids));
+  std::map<VersionId, StoredCalibration> reports;
+  for (StoredCalibration& report : read) {
+    VersionId id(report.rig, report.version);
+    reports.emplace(std::move(id), std::move(report));
   }
-  return versions;
+  return reports;
 }
 
 absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
@@ -81,7 +81,7 @@ absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
   SELFCAL_ASSIGN_OR_RETURN(
       const ListParent parent,
       ReadListParent(call, request.parent(), request.rig_filter()));
-  std::map<VersionId, StoredCalibration> versions;
+  std::map<VersionId, StoredCalibration> reports;
   return FillPage<v1::ListRecalibrationsResponse>(
       request,
       request.parent(),
@@ -89,14 +89,14 @@ absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
         SELFCAL_ASSIGN_OR_RETURN(
             Listed<StoredRun> listed,
             context.store->ListRuns(parent.rig, page, parent.of));
-        SELFCAL_ASSIGN_OR_RETURN(versions,
-                                 VersionsOf(context.store, listed.items));
+        SELFCAL_ASSIGN_OR_RETURN(reports,
+                                 ReportsOf(context.store, listed.items));
         return listed;
       },
       [&](const StoredRun& run, v1::ListRecalibrationsResponse* to) {
-        const auto version = versions.find({run.rig, run.calibration_version});
+        const auto report = reports.find({run.rig, run.calibration_version});
         *to->add_recalibrations() = Encode(
-            run, {}, version == versions.end() ? nullptr : &version->second);
+            run, {}, report == reports.end() ? nullptr : &report->second);
         return absl::OkStatus();
       });
 }

@@ -36,12 +36,24 @@ std::string SerializeCalibration(const StoredCalibration& calibration) {
   return record.SerializeAsString();
 }
 
-absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
-                                                   const std::string& what) {
-  store::CalibrationRecord record;
+namespace {
+
+bool ParseBytes(std::string_view bytes, store::CalibrationRecord* record) {
+  if (!record->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    return false;
+  }
+  if (record->has_earlier_report()) {
+    *record->mutable_report() =
+        Upgrade(record->earlier_report(), record->rig());
+  }
+  return true;
+}
+
+// Without the steps.
+absl::StatusOr<StoredCalibration> FromRecord(
+    const store::CalibrationRecord& record, const std::string& what) {
   StoredCalibration calibration;
-  if (!record.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
-      !FromProto(record.theta(), "", &calibration.theta).empty() ||
+  if (!FromProto(record.theta(), "", &calibration.theta).empty() ||
       !GetMatrix(record.covariance(), &calibration.covariance) ||
       !ToTangent(
           calibration.theta, record.components(), &calibration.covariance)) {
@@ -52,9 +64,6 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
   calibration.reasons.assign(record.reasons().begin(), record.reasons().end());
   calibration.base_version = record.base_version();
   calibration.program_version = record.program_version();
-  if (record.has_earlier_report()) {
-    *record.mutable_report() = Upgrade(record.earlier_report(), record.rig());
-  }
   if (record.has_report()) {
     calibration.report = FromProto(record.report());
     calibration.report->theta = calibration.theta;
@@ -70,12 +79,42 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
   for (const auto& setting : record.settings()) {
     calibration.settings.emplace_back(setting.name(), setting.value());
   }
+  return calibration;
+}
+
+}  // namespace
+
+absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
+                                                   const std::string& what) {
+  store::CalibrationRecord record;
+  if (!ParseBytes(bytes, &record)) return DamagedRecord(what);
+  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration,
+                           FromRecord(record, what));
   for (const store::StepRecord& step : record.steps()) {
     if (!GetStep(
             step, record.components(), &calibration.steps.emplace_back())) {
       return DamagedRecord(what);
     }
   }
+  return calibration;
+}
+
+absl::StatusOr<StoredCalibration> ParseWithoutSteps(std::string_view bytes,
+                                                    const std::string& what) {
+  store::CalibrationRecord record;
+  if (!ParseBytes(bytes, &record)) return DamagedRecord(what);
+  return FromRecord(record, what);
+}
+
+absl::StatusOr<StoredCalibration> ParseReport(std::string_view bytes,
+                                              const std::string& what) {
+  store::CalibrationRecord record;
+  if (!ParseBytes(bytes, &record)) return DamagedRecord(what);
+  StoredCalibration calibration;
+  calibration.rig = record.rig();
+  calibration.version = record.version();
+  if (record.has_report()) calibration.report = FromProto(record.report());
+  calibration.seconds = record.seconds();
   return calibration;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <string_view>
 #include <utility>
 
 #include "server/status/status_macros.h"
@@ -72,21 +73,36 @@ absl::Status ReadSegments(Connection* db,
   return read.status();
 }
 
-// Reads all but the segments.
-absl::StatusOr<StoredCalibration> CalibrationFromRow(const Statement& row) {
-  const std::int64_t version = row.Int(0);
-  const std::int64_t rig_id = row.Int(11);
-  const std::string rig = row.Text(12);
+using Parser = absl::StatusOr<StoredCalibration> (*)(std::string_view,
+                                                     const std::string&);
+
+// The record of the version, from its bytes and their checksum in these
+// columns.
+absl::StatusOr<StoredCalibration> ParseColumns(const Statement& row,
+                                               int content,
+                                               const std::string& rig,
+                                               std::int64_t version,
+                                               Parser parse) {
   const std::string what =
       fmt::format("calibration {} of rig {}", version, rig);
-  const std::string content = row.Text(4);
-  SELFCAL_RETURN_IF_ERROR(VerifySha256(content, row.Text(5), what));
-  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration,
-                           ParseCalibration(content, what));
+  const std::string bytes = row.Text(content);
+  SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(content + 1), what));
+  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration, parse(bytes, what));
   if (calibration.rig != rig || calibration.version != version) {
     return absl::DataLossError(fmt::format(
         "{} holds the content of another version; restore a backup", what));
   }
+  return calibration;
+}
+
+// Reads all but the segments.
+absl::StatusOr<StoredCalibration> CalibrationFromRow(
+    const Statement& row, Parser parse = ParseCalibration) {
+  const std::int64_t version = row.Int(0);
+  const std::int64_t rig_id = row.Int(11);
+  const std::string rig = row.Text(12);
+  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration,
+                           ParseColumns(row, 4, rig, version, parse));
   calibration.rig_key = rig_id;
   calibration.state = static_cast<CalibrationState>(row.Int(1) - 1);
   calibration.create_time_ns = row.Int(2);
@@ -94,6 +110,8 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(const Statement& row) {
     calibration.run = row.Int(3);
   }
   if (!row.IsNull(6)) {
+    const std::string what =
+        fmt::format("calibration {} of rig {}", version, rig);
     const std::string validation = row.Text(6);
     SELFCAL_RETURN_IF_ERROR(
         VerifySha256(validation, row.Text(7), "the validation of " + what));
@@ -105,9 +123,12 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(const Statement& row) {
   return calibration;
 }
 
-absl::Status AddUnlessDamaged(const Statement& row,
+absl::StatusOr<StoredCalibration> ReportFromRow(const Statement& row) {
+  return ParseColumns(row, 2, row.Text(1), row.Int(0), ParseReport);
+}
+
+absl::Status AddUnlessDamaged(absl::StatusOr<StoredCalibration> calibration,
                               std::vector<StoredCalibration>* calibrations) {
-  auto calibration = CalibrationFromRow(row);
   if (absl::IsDataLoss(calibration.status())) return absl::OkStatus();
   SELFCAL_RETURN_IF_ERROR(calibration.status());
   calibrations->push_back(*std::move(calibration));
@@ -156,7 +177,8 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfMany(
       break;
     }
     place = {read.Int(10), read.Int(11), read.Int(0)};
-    SELFCAL_RETURN_IF_ERROR(AddUnlessDamaged(read, &listed.items));
+    SELFCAL_RETURN_IF_ERROR(AddUnlessDamaged(
+        CalibrationFromRow(read, ParseWithoutSteps), &listed.items));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &listed.items));
@@ -165,24 +187,25 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfMany(
 
 }  // namespace
 
-absl::StatusOr<std::vector<StoredCalibration>> ReadCalibrations(
+absl::StatusOr<std::vector<StoredCalibration>> ReadReports(
     Connection* db, const std::vector<VersionId>& versions) {
-  std::vector<StoredCalibration> calibrations;
-  if (versions.empty()) return calibrations;
+  std::vector<StoredCalibration> reports;
+  if (versions.empty()) return reports;
   std::vector<std::vector<SqlCondition::Value>> ids;
   for (const auto& [rig, version] : versions) ids.push_back({rig, version});
   SqlCondition condition;
   condition.AndIn("(g.id, c.version)", ids);
   Statement read(db,
                  condition.reuse(),
-                 kCalibrationColumns + ("WHERE " + condition.sql()));
+                 "SELECT c.version, g.id, c.content, c.sha256 "
+                 "FROM calibrations c JOIN rigs g ON g.rig = c.rig WHERE " +
+                     condition.sql());
   condition.Bind(&read);
   while (read.Next()) {
-    SELFCAL_RETURN_IF_ERROR(AddUnlessDamaged(read, &calibrations));
+    SELFCAL_RETURN_IF_ERROR(AddUnlessDamaged(ReportFromRow(read), &reports));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
-  SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &calibrations));
-  return calibrations;
+  return reports;
 }
 
 absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
@@ -234,7 +257,7 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
   Listed<StoredCalibration> listed;
   while (read.Next()) {
     SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration,
-                             CalibrationFromRow(read));
+                             CalibrationFromRow(read, ParseWithoutSteps));
     listed.items.push_back(std::move(calibration));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());

@@ -23,8 +23,8 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
 absl::StatusOr<StoredCalibration> ReadActiveCalibration(Connection* db,
                                                         const std::string& rig);
 
-// Store::GetCalibrations.
-absl::StatusOr<std::vector<StoredCalibration>> ReadCalibrations(
+// Store::GetReports.
+absl::StatusOr<std::vector<StoredCalibration>> ReadReports(
     Connection* db, const std::vector<VersionId>& versions);
 
 // Store::ListCalibrations.

@@ -195,9 +195,9 @@ class DatabaseStore final : public Store {
     return Read([&](Connection* db) { return ReadActiveCalibration(db, rig); });
   }
 
-  absl::StatusOr<std::vector<StoredCalibration>> GetCalibrations(
+  absl::StatusOr<std::vector<StoredCalibration>> GetReports(
       const std::vector<VersionId>& versions) override {
-    return Read([&](Connection* db) { return ReadCalibrations(db, versions); });
+    return Read([&](Connection* db) { return ReadReports(db, versions); });
   }
 
   absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(

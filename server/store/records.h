@@ -31,6 +31,12 @@ absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
 std::string SerializeCalibration(const StoredCalibration& calibration);
 absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
                                                    const std::string& what);
+// The same without the iterations of the solver, which are most of the work.
+absl::StatusOr<StoredCalibration> ParseWithoutSteps(std::string_view bytes,
+                                                    const std::string& what);
+// Rig, version, report and seconds of the same record.
+absl::StatusOr<StoredCalibration> ParseReport(std::string_view bytes,
+                                              const std::string& what);
 
 // Reasons, validation and verdict of a candidate.
 std::string SerializeValidation(const StoredCalibration& validated);

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <cstdint>
+#include <map>
+#include <utility>
 
 #include "server/status/status_macros.h"
 #include "server/store/announcements.h"
+#include "server/store/driver/sql_condition.h"
 #include "server/store/driver/statement.h"
 #include "server/store/paging.h"
 #include "server/store/rig_lists.h"
@@ -28,17 +31,32 @@ absl::StatusOr<std::vector<SegmentKey>> ReadKeys(Statement* read) {
   return keys;
 }
 
-absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
-                                                     std::int64_t rig,
-                                                     std::int64_t run) {
+// Runs whose snapshots are read together: an engine limits the parameters of a
+// statement.
+constexpr std::size_t kSnapshotsAtOnce = 1000;
+
+// A run is its rig's key and its number.
+using RunKey = std::pair<std::int64_t, std::int64_t>;
+
+// Adds the segments of the snapshots to these runs.
+absl::Status ReadSnapshots(Connection* db,
+                           const std::map<RunKey, StoredRun*>& runs) {
+  std::vector<std::vector<SqlCondition::Value>> keys;
+  for (const auto& [key, run] : runs) keys.push_back({key.first, key.second});
+  SqlCondition condition;
+  condition.AndIn("(x.rig, x.run)", keys);
   Statement read(db,
-                 "SELECT s.session, s.session_index FROM run_segments x "
-                 "CROSS JOIN segments s "
-                 "WHERE s.rig = x.rig AND s.sequence = x.sequence "
-                 "AND x.rig = ?1 AND x.run = ?2 ORDER BY x.sequence",
-                 rig,
-                 run);
-  return ReadKeys(&read);
+                 condition.reuse(),
+                 "SELECT x.rig, x.run, s.session, s.session_index "
+                 "FROM run_segments x CROSS JOIN segments s "
+                 "WHERE s.rig = x.rig AND s.sequence = x.sequence AND " +
+                     condition.sql() + " ORDER BY x.rig, x.run, x.sequence");
+  condition.Bind(&read);
+  while (read.Next()) {
+    runs.at({read.Int(0), read.Int(1)})
+        ->segments.push_back({read.Text(2), read.Int(3)});
+  }
+  return read.status();
 }
 
 // The trigger that the columns cause, change and session_ended encode.
@@ -58,7 +76,8 @@ RunTrigger TriggerOf(std::int64_t cause,
   }
 }
 
-absl::StatusOr<StoredRun> RunFromRow(Connection* db, const Statement& row) {
+// All but the segments.
+StoredRun RunFromRow(const Statement& row) {
   StoredRun run;
   run.rig = row.Text(0);
   run.run = row.Int(1);
@@ -73,20 +92,41 @@ absl::StatusOr<StoredRun> RunFromRow(Connection* db, const Statement& row) {
   run.change = row.Int(11);
   run.create_steady_ns = row.Int(13);
   run.end_steady_ns = row.Int(14);
-  SELFCAL_ASSIGN_OR_RETURN(run.segments,
-                           ReadSnapshot(db, row.Int(10), run.run));
   return run;
+}
+
+// Runs, and the key of each, without their segments.
+struct RunRows {
+  std::vector<StoredRun> runs;
+  std::vector<RunKey> keys;
+};
+
+absl::StatusOr<RunRows> ReadRows(Statement* read) {
+  RunRows rows;
+  while (read->Next()) {
+    rows.runs.push_back(RunFromRow(*read));
+    rows.keys.emplace_back(read->Int(10), rows.runs.back().run);
+  }
+  SELFCAL_RETURN_IF_ERROR(read->status());
+  return rows;
+}
+
+// The runs of the rows with their segments.
+absl::StatusOr<std::vector<StoredRun>> Complete(Connection* db, RunRows rows) {
+  std::map<RunKey, StoredRun*> some;
+  for (std::size_t k = 0; k < rows.runs.size(); ++k) {
+    some[rows.keys[k]] = &rows.runs[k];
+    if (some.size() < kSnapshotsAtOnce && k + 1 < rows.runs.size()) continue;
+    SELFCAL_RETURN_IF_ERROR(ReadSnapshots(db, some));
+    some.clear();
+  }
+  return std::move(rows.runs);
 }
 
 absl::StatusOr<std::vector<StoredRun>> ReadAll(Connection* db,
                                                Statement* read) {
-  std::vector<StoredRun> runs;
-  while (read->Next()) {
-    SELFCAL_ASSIGN_OR_RETURN(StoredRun run, RunFromRow(db, *read));
-    runs.push_back(std::move(run));
-  }
-  SELFCAL_RETURN_IF_ERROR(read->status());
-  return runs;
+  SELFCAL_ASSIGN_OR_RETURN(RunRows rows, ReadRows(read));
+  return Complete(db, std::move(rows));
 }
 
 // The value of the column cause.
@@ -123,7 +163,7 @@ absl::StatusOr<Listed<StoredRun>> ListRunsOfMany(Connection* db,
                                                  const Page& page,
                                                  const RigQuery& of) {
   const std::string list = "runs of many " + FilterText(of);
-  SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(list, page));
+  SELFCAL_ASSIGN_OR_RETURN(const TimePlace place, TimePlaceOf(list, page));
   const int size = PageSize(page);
   SqlCondition condition(5);
   AddRigConditions(of, "g", &condition);
@@ -140,17 +180,15 @@ absl::StatusOr<Listed<StoredRun>> ListRunsOfMany(Connection* db,
                  place.number,
                  size + 1);
   condition.Bind(&read);
+  SELFCAL_ASSIGN_OR_RETURN(RunRows rows, ReadRows(&read));
   Listed<StoredRun> listed;
-  while (read.Next()) {
-    if (static_cast<int>(listed.items.size()) == size) {
-      listed.next_token = TokenAfter(list, place);
-      break;
-    }
-    place = {read.Int(13), read.Int(10), read.Int(1)};
-    SELFCAL_ASSIGN_OR_RETURN(StoredRun run, RunFromRow(db, read));
-    listed.items.push_back(std::move(run));
+  if (static_cast<int>(rows.runs.size()) > size) {
+    rows.runs.pop_back();
+    const auto [rig_key, run] = rows.keys[rows.runs.size() - 1];
+    listed.next_token =
+        TokenAfter(list, {rows.runs.back().create_steady_ns, rig_key, run});
   }
-  SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_ASSIGN_OR_RETURN(listed.items, Complete(db, std::move(rows)));
   return listed;
 }
 

@@ -421,11 +421,12 @@ class Store {
       const std::string& rig, std::int64_t version) = 0;
   virtual absl::StatusOr<StoredCalibration> GetActiveCalibration(
       const std::string& rig) = 0;
-  // Those that exist and are not damaged, in any order.
-  virtual absl::StatusOr<std::vector<StoredCalibration>> GetCalibrations(
+  // Rig, version, report and seconds of those that exist and are not damaged,
+  // in any order.
+  virtual absl::StatusOr<std::vector<StoredCalibration>> GetReports(
       const std::vector<VersionId>& versions) = 0;
   // Newest first, of one rig or, if `rig` is empty, of those of `of` by their
-  // steady time, without damaged ones.
+  // steady time, without damaged ones. They lack `steps`.
   virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
       const std::string& rig, const Page& page, const RigQuery& of = {}) = 0;
   // Parameters of versions, of all rigs of the query, in the order of keys of

@@ -36,8 +36,12 @@ class FleetListsTest : public StoreTest {
 
   void Finish(const std::string& id, std::int64_t run) {
     ASSERT_TRUE(domain_->BeginRun(id, run).ok());
-    const auto finished = domain_->FinishRun(
-        id, run, TestCalibration(TestRig(id), *store_->GetRun(id, run)));
+    StoredCalibration found =
+        TestCalibration(TestRig(id), *store_->GetRun(id, run));
+    found.report = CalibrationResult();
+    found.report->final_cost = 10.0 * run + id.front();
+    found.report->segment_fits.resize(2);
+    const auto finished = domain_->FinishRun(id, run, found);
     ASSERT_TRUE(finished.ok()) << finished.status();
   }
 
@@ -305,7 +309,7 @@ TEST_P(FleetListsTest, DamagedVersionsDoNotHideOthers) {
     EXPECT_EQ(version.rig, "b");
   }
   EXPECT_THAT(listed->items, SizeIs(2));
-  const auto several = store_->GetCalibrations({{"a", 1}, {"b", 2}});
+  const auto several = store_->GetReports({{"a", 1}, {"b", 2}});
   ASSERT_TRUE(several.ok()) << several.status();
   ASSERT_THAT(*several, SizeIs(1));
   EXPECT_EQ(several->front().rig, "b");
@@ -326,24 +330,48 @@ TEST_P(FleetListsTest, RecordsOfSeveralRigsAreThoseOfEach) {
   Finish("c", 1);
   Run("c", 3);
 
-  const auto versions = store_->GetCalibrations(
-      {{"c", 2}, {"nobody", 1}, {"b", 2}, {"a", 2}, {"a", 1}});
+  const auto versions = store_->ListCalibrations("", {});
   ASSERT_TRUE(versions.ok()) << versions.status();
-  EXPECT_THAT(*versions, SizeIs(3));
-  for (const StoredCalibration& version : *versions) {
+  EXPECT_THAT(versions->items, SizeIs(6));
+  for (const StoredCalibration& version : versions->items) {
     const auto one = store_->GetCalibration(version.rig, version.version);
     ASSERT_TRUE(one.ok()) << one.status();
     EXPECT_EQ(version.theta.cameras.size(), one->theta.cameras.size());
     EXPECT_EQ(version.covariance, one->covariance);
     EXPECT_EQ(version.create_time_ns, one->create_time_ns);
     EXPECT_EQ(version.segments, one->segments);
-    EXPECT_EQ(version.segments.size(), version.rig == "a" ? 0u : 2u);
-    ASSERT_EQ(version.temperatures.has_value(), version.rig != "a");
+    EXPECT_EQ(version.segments.size(), version.version == 1 ? 0u : 2u);
+    ASSERT_EQ(version.temperatures.has_value(), version.version != 1);
     if (!version.temperatures) continue;
     EXPECT_EQ(version.temperatures->segments, 2);
     EXPECT_EQ(version.temperatures->min_c, version.rig == "b" ? 30 : 20);
     EXPECT_EQ(version.temperatures->max_c, version.rig == "b" ? 31 : 21);
     EXPECT_EQ(version.temperatures->mean_c, version.rig == "b" ? 30.5 : 20.5);
+  }
+
+  const auto reports = store_->GetReports(
+      {{"c", 2}, {"nobody", 1}, {"b", 2}, {"a", 2}, {"a", 1}});
+  ASSERT_TRUE(reports.ok()) << reports.status();
+  EXPECT_THAT(*reports, SizeIs(3));
+  for (const StoredCalibration& of : *reports) {
+    const auto one = store_->GetCalibration(of.rig, of.version);
+    ASSERT_TRUE(one.ok()) << one.status();
+    EXPECT_EQ(of.seconds, one->seconds);
+    ASSERT_EQ(of.report.has_value(), one->report.has_value());
+    EXPECT_EQ(of.report.has_value(), of.rig != "a");
+    if (!of.report) continue;
+    EXPECT_EQ(of.report->final_cost, 10.0 + of.rig.front());
+    EXPECT_THAT(of.report->segment_fits, SizeIs(2));
+  }
+
+  const auto runs = store_->ListRuns("", {});
+  ASSERT_TRUE(runs.ok()) << runs.status();
+  EXPECT_THAT(runs->items, SizeIs(4));
+  for (const StoredRun& run : runs->items) {
+    const auto one = store_->GetRun(run.rig, run.run);
+    ASSERT_TRUE(one.ok()) << one.status();
+    EXPECT_THAT(run.segments, SizeIs(2));
+    EXPECT_EQ(run.segments, one->segments);
   }
 
   const auto rigs = store_->GetRigs({"a", "c", "nobody"});
