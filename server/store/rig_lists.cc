@@ -45,6 +45,14 @@ std::string ColumnOf(RigQuery::Order order) {
   return "";
 }
 
+// On a row n of rig_name_suffixes: a name contains the text if one of its
+// suffixes begins with it. No character of a name is as large as the last one
+// of the bound.
+void AddTextCondition(const std::string& text, SqlCondition* condition) {
+  condition->And("n.suffix >= " + condition->Parameter(text));
+  condition->And("n.suffix < " + condition->Parameter(text + '\x7f'));
+}
+
 std::string ListOf(const RigQuery& query) {
   return fmt::format("rigs by {}{} with {}",
                      ColumnOf(query.order),
@@ -76,7 +84,33 @@ absl::StatusOr<Place> PlaceOf(const RigQuery& query, const Page& page) {
   return place;
 }
 
-std::string SqlOf(const RigQuery& query, const SqlCondition& condition) {
+// Up to this number of names with a text, all of them are read and sorted.
+constexpr std::int64_t kFewNames = 2000;
+
+// Whether few names contain the text of the query.
+absl::StatusOr<bool> FindsFewNames(Connection* db, const RigQuery& query) {
+  if (query.text.empty()) return false;
+  SqlCondition condition;
+  AddTextCondition(query.text, &condition);
+  Statement read(
+      db,
+      condition.reuse(),
+      fmt::format("SELECT count(*) FROM (SELECT 1 "
+                  "FROM rig_name_suffixes n WHERE {} LIMIT {}) AS few",
+                  condition.sql(),
+                  kFewNames + 1));
+  condition.Bind(&read);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return found && read.Int(0) <= kFewNames;
+}
+
+// `of_few`: few rigs meet the condition. No index has the expression that they
+// are then sorted by: planners would read the rigs in the order of one, to find
+// those few among them.
+std::string SqlOf(const RigQuery& query,
+                  const SqlCondition& condition,
+                  bool of_few) {
   const std::string column = ColumnOf(query.order);
   const bool by_name = column.empty();
   const char* direction = query.descending ? "DESC" : "ASC";
@@ -85,8 +119,10 @@ std::string SqlOf(const RigQuery& query, const SqlCondition& condition) {
       by_name ? fmt::format("id {} ?2", beyond)
               : fmt::format("({}, id) {} (?1, ?2)", column, beyond);
   const std::string order =
-      by_name ? fmt::format("id {}", direction)
-              : fmt::format("{0} {1}, id {1}", column, direction);
+      by_name
+          ? fmt::format("id{} {}", of_few ? " || ''" : "", direction)
+          : fmt::format(
+                "{0}{2} {1}, id {1}", column, direction, of_few ? " + 0" : "");
   // The condition on the name does not use ?1, so it is used here.
   return fmt::format(
       "SELECT rig, id, create_time_ns, last_seen_ns, {} FROM rigs "
@@ -102,11 +138,12 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
                                             const RigQuery& query,
                                             const Place& place,
                                             int limit) {
+  SELFCAL_ASSIGN_OR_RETURN(const bool of_few, FindsFewNames(db, query));
   SqlCondition condition(4);
   AddRigConditions(query, "rigs", &condition);
   Statement read(db,
                  condition.reuse(),
-                 SqlOf(query, condition),
+                 SqlOf(query, condition, of_few),
                  place.value,
                  place.id,
                  limit);
@@ -263,11 +300,12 @@ void AddRigConditions(const RigQuery& query,
     return fmt::format("{}.id = {}", rigs, condition->Parameter(name));
   };
   if (!query.text.empty()) {
-    // A text contains another if it changes when that is removed. LIKE is no
-    // quicker, and planners take it for rarer than it is.
-    condition->And(fmt::format("replace({0}.id, {1}, '') <> {0}.id",
-                               rigs,
-                               condition->Parameter(query.text)));
+    SqlCondition names = condition->Next();
+    AddTextCondition(query.text, &names);
+    condition->AndWithin(
+        rigs + ".rig IN (SELECT n.rig FROM rig_name_suffixes n WHERE ",
+        names,
+        ")");
   }
   if (!query.name.empty()) condition->And(has_name(query.name));
   for (const auto& label : query.labels) condition->And(has_label(label));

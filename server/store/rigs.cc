@@ -148,6 +148,7 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
                             "segments",
                             "claims",
                             "rig_labels",
+                            "rig_name_suffixes",
                             "cohort_outliers",
                             "instructions",
                             "reported_rigs",

@@ -157,6 +157,12 @@ def _fill_rigs(cursor) -> None:
         "copied.chosen r JOIN copied.rigs t USING (seed) "
         "JOIN copied.definitions d USING (seed, labels) ORDER BY r.n",
     )
+    # As the trigger does, which is off.
+    cursor.execute(
+        "INSERT INTO rig_name_suffixes (rig, suffix) "
+        "SELECT rig, substr(id, k) "
+        "FROM copied.chosen, generate_series(1, length(id)) k"
+    )
     for number, labels in enumerate(real_rigs.LABELS):
         for label, value in labels.items():
             cursor.execute(

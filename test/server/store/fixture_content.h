@@ -60,6 +60,9 @@ inline void ExpectFixture(Store* store) {
   const auto rig = store->GetRig("a");
   ASSERT_TRUE(rig.ok()) << rig.status();
   EXPECT_EQ(rig->rig.table_size, FixtureRig().table_size);
+  const auto found = store->ListRigSummaries({.text = "a"}, {});
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_EQ(found->items.size(), 1u);
   const auto segments = store->ListSegments("a", {});
   ASSERT_TRUE(segments.ok()) << segments.status();
   ASSERT_EQ(segments->items.size(), 4u);

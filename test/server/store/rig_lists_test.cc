@@ -1,3 +1,8 @@
+#include <algorithm>
+#include <set>
+#include <string>
+#include <vector>
+
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -59,6 +64,82 @@ TEST_P(RigSummariesTest, TextIsLookedForInTheName) {
   CreateTestRig("t_blet");
   EXPECT_THAT(with("t_b"), ElementsAre("t_blet"));
   EXPECT_THAT(with("-1"), ElementsAre("phone-1", "tablet-1"));
+}
+
+// The search reads an index, so its result is compared with that of a search
+// that does not.
+TEST_P(RigSummariesTest, EveryTextFindsTheNamesThatContainIt) {
+  std::set<std::string> names = {"a",
+                                 "aa",
+                                 "aaa",
+                                 "ab-ba",
+                                 "-",
+                                 "_",
+                                 "__",
+                                 "0",
+                                 "a_b",
+                                 "a-b",
+                                 "zzz",
+                                 std::string(63, 'x'),
+                                 std::string(62, 'x') + "y"};
+  for (const std::string& name : names) CreateTestRig(name);
+  std::set<std::string> texts = {"",
+                                 "%",
+                                 "a%",
+                                 "\\",
+                                 "\\_",
+                                 "*",
+                                 "?",
+                                 "A",
+                                 "ä",
+                                 "\x7f",
+                                 "a\x7f",
+                                 "~",
+                                 " ",
+                                 "'",
+                                 std::string(64, 'x'),
+                                 "\U0010FFFF"};
+  for (const std::string& name : names) {
+    for (std::size_t k = 0; k < name.size(); ++k) {
+      texts.insert(name.substr(k));
+      texts.insert(name.substr(k, 1));
+      texts.insert(name.substr(k, 2));
+    }
+  }
+  const auto expect_all = [&] {
+    for (const std::string& text : texts) {
+      std::vector<std::string> expected;
+      for (const std::string& name : names) {
+        if (name.find(text) != std::string::npos) expected.push_back(name);
+      }
+      for (const RigOrder order : {RigOrder::kName, RigOrder::kLastSeen}) {
+        EXPECT_EQ(Names({text, {}, order, false, ""}, 3), expected) << text;
+      }
+    }
+  };
+  expect_all();
+  ASSERT_TRUE(domain_->DeleteRig("aa", "eve", "sold").ok());
+  names.erase("aa");
+  expect_all();
+  CreateTestRig("aa");
+  names.insert("aa");
+  expect_all();
+}
+
+// More places than are read and sorted (kFewNames of rig_lists.cc): these names
+// have 2,135 of them, as each letter counts.
+TEST_P(RigSummariesTest, ATextThatIsInManyPlacesIsFound) {
+  std::vector<std::string> expected;
+  for (int k = 10; k < 45; ++k) {
+    expected.push_back(std::string(61, 'a') + std::to_string(k));
+    CreateTestRig(expected.back());
+  }
+  CreateTestRig("b");
+  for (const RigOrder order : {RigOrder::kName, RigOrder::kLastSeen}) {
+    EXPECT_EQ(Names({"a", {}, order, false, ""}, 10), expected);
+  }
+  std::reverse(expected.begin(), expected.end());
+  EXPECT_EQ(Names({"a", {}, RigOrder::kName, true, ""}, 10), expected);
 }
 
 TEST_P(RigSummariesTest, ANameIsComparedAsAWhole) {

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "migrations/migrations.h"
 #include "server/store/postgres/postgres.h"
 #include "test/server/store/postgres/postgres_test.h"
 
@@ -48,6 +49,33 @@ TEST_F(OpenSchemaTest, EachMigrationIsAppliedOnceAndRecorded) {
   EXPECT_EQ(Number("SELECT count(*) FROM schema_migrations "
                    "WHERE apply_time_ns = 5"),
             3);
+}
+
+// Version 8 searches names by their suffixes: those of rigs from before it, of
+// rigs that an earlier program adds afterwards, and not of one that it deletes.
+TEST_F(OpenSchemaTest, NamesOfAllRigsHaveTheirSuffixes) {
+  const auto all = PostgresMigrations();
+  const std::vector<Migration> before(all.begin(), all.begin() + 7);
+  ASSERT_TRUE(OpenWith(before).ok());
+  const auto add = [&](const std::string& key, const std::string& name) {
+    return db_->Execute(
+        "INSERT INTO rigs (rig, id, create_time_ns, definition, sha256) "
+        "VALUES (" +
+        key + ", '" + name + "', 0, '', '')");
+  };
+  ASSERT_TRUE(add("7", "bolt").ok());
+  ASSERT_TRUE(add("8", "oo").ok());
+  ASSERT_TRUE(OpenWith({all.begin(), all.end()}).ok());
+  const auto suffixes = [&](const std::string& of) {
+    return Number("SELECT count(*) FROM rig_name_suffixes WHERE " + of);
+  };
+  EXPECT_EQ(suffixes("TRUE"), 6);
+  EXPECT_EQ(suffixes("rig = 7 AND suffix IN ('bolt', 'olt', 'lt', 't')"), 4);
+  EXPECT_EQ(suffixes("rig = 8 AND suffix IN ('oo', 'o')"), 2);
+  ASSERT_TRUE(add("9", "nut").ok());
+  EXPECT_EQ(suffixes("rig = 9 AND suffix IN ('nut', 'ut', 't')"), 3);
+  ASSERT_TRUE(db_->Execute("DELETE FROM rigs WHERE rig = 7").ok());
+  EXPECT_EQ(suffixes("TRUE"), 5);
 }
 
 TEST_F(OpenSchemaTest, AFailedMigrationChangesNothing) {

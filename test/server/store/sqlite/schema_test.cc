@@ -67,6 +67,7 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
       "cohort_outliers",
       // The hub has its own key, and derives the rest from what is reported.
       "estimates",
+      "rig_name_suffixes",
       "rigs.alarms",
       "rigs.session_check_ns",
       "rigs.time_check_ns",
