@@ -42,7 +42,12 @@ void LinearObservations::SortByView(int views) {
 void LinearObservations::Collect(const LinearPoint& point) {
   cameras_ = static_cast<int>(point.thetas[0].cameras.size());
   PlaceLandmarks(point);
+  std::size_t count = 0;
+  for (const ScreenedLandmark& landmark : point.landmarks) {
+    count += landmark.used.size();
+  }
   all_.clear();
+  all_.reserve(count);
   landmark_begin_.assign(1, 0);
   for (std::size_t i = 0; i < point.landmarks.size(); ++i) {
     const ScreenedLandmark& landmark = point.landmarks[i];

@@ -4,9 +4,11 @@
 
 namespace selfcal {
 
-void LinearSystem::ReleaseChains() {
+void LinearSystem::ReleaseMemory() {
   chains_.clear();
   chains_.shrink_to_fit();
+  observations_ = LinearObservations();
+  plan_ = EliminationPlan();
 }
 
 void LinearSystem::EliminateChain(const LinearPoint& point,

@@ -72,8 +72,8 @@ class LinearSystem {
   const SharedInformation& information() const { return information_; }
 
   // Frees the memory that steps and posterior need: until the next
-  // linearisation only the information remains.
-  void ReleaseChains();
+  // linearisation only information and decrease remain.
+  void ReleaseMemory();
 
   // Decrease of F by the optimal steps of keyframes and landmarks with theta
   // held constant; with a step s of theta, F decreases by

@@ -68,7 +68,7 @@ void NoiseWeighting::EstimateFactors() {
   std::vector<ScreenedLandmark> landmarks = point_->screening().landmarks;
   ScaleWeights(Square(point_->screening().track_noise_factor), &landmarks);
   // Their estimation has its own linear system.
-  point_->linearised().system.ReleaseChains();
+  point_->linearised().system.ReleaseMemory();
   scales_ = EstimateNoiseScales(stated_,
                                 point_->RoundOfNoise(basis),
                                 point_->estimate(),

@@ -36,7 +36,7 @@ std::optional<ThetaSubspace> HoldSpuriousDirections(
   if (subspace.estimated.cols() == 0) return std::nullopt;
   const Eigen::MatrixXd nothing = NoDirections(*point);
   const SolverRound round = point->RoundOfNoise(nothing);
-  point->linearised().system.ReleaseChains();  // each replica has its own
+  point->linearised().system.ReleaseMemory();  // each replica has its own
   const Eigen::MatrixXd& Lambda = point->information().Lambda;
   std::vector<Eigen::MatrixXd> under_noise;
   Eigen::MatrixXd spurious = nothing;
