@@ -29,6 +29,7 @@ struct Arguments {
   double excitation = 1;
   double exposure_ms = 0;
   double line_delay_us = 0;
+  bool twin = false;
   bool wrong_start = false;
   RenderOptions options;
 };
@@ -78,6 +79,9 @@ void Define(CLI::App* app, Arguments* arguments) {
   app->add_option("--device",
                   arguments->device,
                   "handheld, stereo, or a camera model (fov, unified, ...)");
+  app->add_flag("--twin",
+                arguments->twin,
+                "With a second camera of the same kind, 11 cm to the right");
   app->add_option("--motion",
                   arguments->motion,
                   "handheld, mixed, rotation, or a TUM file of poses");
@@ -116,6 +120,7 @@ int Run(Arguments arguments) {
   RenderOptions& options = arguments.options;
   options.exposure_s = arguments.exposure_ms * 1e-3;
   Rig rig = RigNamed(arguments.device);
+  if (arguments.twin) rig = TwinRig(std::move(rig));
   if (arguments.line_delay_us > 0) {
     for (CameraCalibration& camera : rig.factory.cameras) {
       camera.line_delay_s = arguments.line_delay_us * 1e-6;

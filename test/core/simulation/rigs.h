@@ -97,6 +97,18 @@ inline Rig LensRig(DistortionModel model) {
   return rig;
 }
 
+// A rig of one camera with another of the same kind 11 cm to its right, as SLAM
+// systems for stereo need them.
+inline Rig TwinRig(Rig rig) {
+  CameraCalibration right = rig.factory.cameras.at(0);
+  right.q_CI = Exp({0.005, -0.01, 0.003}) * right.q_CI;
+  right.p_CI.x() -= 0.11;
+  right.f *= 1.004;
+  right.c += Eigen::Vector2d(4, -3);
+  rig.factory.cameras = {rig.factory.cameras[0], right};
+  return rig;
+}
+
 // The calibration of a start that is wrong by 5 % in f, 10 px in c, 3 degrees,
 // 5 cm and 20 ms.
 inline Calibration WrongStart(const Calibration& truth) {
