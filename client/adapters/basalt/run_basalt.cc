@@ -3,14 +3,17 @@
 // the daemon, and each calibration that becomes active is applied while it
 // runs. Prints Basalt's errors for every version that it ran with.
 //
-//   run_basalt TARGET RIG TRUTH FOLDER CONFIG CALIBRATION [SECONDS] [PACE]
+//   run_basalt TARGET RIG TRUTH FOLDER CONFIG CALIBRATION
+//     [SECONDS [PACE [PAUSE]]]
 //
 // TRUTH is a rig whose factory calibration is the true one. FOLDER has two
 // cameras and the true states on the clock of the IMU. CONFIG is Basalt's
 // configuration, such as its data/euroc_config.json. CALIBRATION is a
 // calibration of Basalt's, as `selfcal calibration export --format basalt`
 // writes it; its noise and rate of the IMU are used. SECONDS end it earlier,
-// and it takes PACE times as long as the recording [1].
+// and it takes PACE times as long as the recording [1]. After PAUSE seconds it
+// waits until a version becomes active, at most 20 minutes: a recording ends,
+// where a device would go on while a slow daemon calibrates.
 //
 // Licence: Apache-2.0. Basalt, whose headers and library this program is built
 // from, is under the 3-clause BSD licence.
@@ -231,14 +234,27 @@ struct Arguments {
   std::string truth, folder, config, calibration;
   double seconds = 1e9;
   double pace = 1;
+  double pause = 1e9;  // [s]
 };
+
+// Waits until another version than that of the adapter is active.
+void WaitForVersion(const selfcal::Watch& watch, const sb::Adapter& adapter) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(20);
+  while (watch.Newest().version() == adapter.version() &&
+         std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
 
 // Feeds images and readings in the order of their times. Returns false if a
 // calibration could not be applied.
 bool Feed(const Arguments& arguments,
           basalt::VioDataset* data,
           sb::Adapter* adapter) {
-  const auto started = std::chrono::steady_clock::now();
+  const selfcal::Watch watch(arguments.client);
+  const std::int64_t first_version = adapter->version();
+  bool has_paused = false;
+  auto started = std::chrono::steady_clock::now();
   const auto& gyro = data->get_gyro_data();
   const auto& accel = data->get_accel_data();
   const std::int64_t begin_ns = data->get_image_timestamps().front();
@@ -256,6 +272,12 @@ bool Feed(const Arguments& arguments,
   for (const std::int64_t t_ns : data->get_image_timestamps()) {
     const double at_s = 1e-9 * static_cast<double>(t_ns - begin_ns);
     if (at_s > arguments.seconds) break;
+    if (at_s > arguments.pause && !has_paused) {
+      const auto begun = std::chrono::steady_clock::now();
+      if (adapter->version() == first_version) WaitForVersion(watch, *adapter);
+      started += std::chrono::steady_clock::now() - begun;
+      has_paused = true;
+    }
     std::this_thread::sleep_until(
         started + std::chrono::duration_cast<std::chrono::nanoseconds>(
                       std::chrono::duration<double>(arguments.pace * at_s)));
@@ -335,10 +357,10 @@ int Run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 7 || argc > 9) {
+  if (argc < 7 || argc > 10) {
     std::fprintf(stderr,
                  "usage: %s TARGET RIG TRUTH FOLDER CONFIG CALIBRATION "
-                 "[SECONDS] [PACE]\n",
+                 "[SECONDS [PACE [PAUSE]]]\n",
                  argv[0]);
     return 2;
   }
@@ -351,6 +373,7 @@ int main(int argc, char** argv) {
   arguments.calibration = argv[6];
   if (argc > 7) arguments.seconds = std::atof(argv[7]);
   if (argc > 8) arguments.pace = std::atof(argv[8]);
+  if (argc > 9) arguments.pause = std::atof(argv[9]);
   try {
     return Run(arguments);
   } catch (const std::exception& error) {

@@ -5,16 +5,15 @@
 # Basalt.
 #
 #   basalt_test.sh BUILD_DIR SOURCE_DIR SELFCALD SELFCAL SELFCAL_RENDER \
-#     BASALT_DIR [BASALT_PREFIX [ADAPTER_BUILD [SECONDS [PACE]]]]
+#     BASALT_DIR [BASALT_PREFIX [ADAPTER_BUILD [SECONDS [PACE [PAUSE]]]]]
 #
 # BASALT_PREFIX has the libraries that Basalt needs and the system lacks.
 # ADAPTER_BUILD keeps the adapter's build, and with it Basalt's library, which
-# takes minutes to compile. Rendering takes about two minutes of CPU time, and
-# the run PACE times SECONDS; the daemon needs seconds of CPU time for a version,
-# which must come before the end: a larger PACE is for a busy machine.
+# takes minutes to compile. Rendering takes about two minutes of CPU time. After
+# PAUSE seconds of the recording, its rest waits for the daemon's version.
 set -euo pipefail
 build=$1 source=$2 selfcald=$3 selfcal=$4 render=$5 basalt=$6
-prefix=${7:-} adapter=${8:-} seconds=${9:-60} pace=${10:-3}
+prefix=${7:-} adapter=${8:-} seconds=${9:-60} pace=${10:-1} pause=${11:-40}
 
 if [[ ! -f $basalt/include/basalt/vi_estimator/vio_estimator.h ]]; then
   echo 'skipped: SELFCAL_BASALT_DIR does not name the source of Basalt'
@@ -97,18 +96,18 @@ END
 start_daemon "$selfcald"
 "$selfcal" rig create "$work/truth.json" >/dev/null
 "$selfcal" rig create "$work/stereo.json" --block '*.time_offset=on' \
-  --prior-sigma '*.time_offset=0.02' --table-size 4 >/dev/null
+  --prior-sigma '*.time_offset=0.02' >/dev/null
 "$selfcal" calibration export stereo --format basalt --imu-rate 200 \
   --output "$work/calibration.json" >/dev/null 2>&1
 export LD_LIBRARY_PATH
 LD_LIBRARY_PATH=$(dirname "$(find "$work/prefix" -name libselfcal.so)")
 "$adapter/basalt_conversion" "$SELFCAL_TARGET" stereo "$work/calibration.json"
-# Fewer tracks than by default, so that the daemon's run takes seconds.
+# Fewer tracks than by default, so that the daemon's run takes less time.
 sed -E 's/(optical_flow_detection_grid_size": )50/\1100/' \
   "$basalt/data/euroc_config.json" >"$work/config.json"
 "$adapter/run_basalt" "$SELFCAL_TARGET" stereo truth "$work/recording" \
   "$work/config.json" "$work/calibration.json" "$seconds" "$pace" \
-  >"$work/shown"
+  "$pause" >"$work/shown"
 # Without what Basalt prints itself.
 grep -E '^(at the|version|segments| +version| .*\.[0-9]{4} .*\.[0-9]{3} )' \
   "$work/shown"
