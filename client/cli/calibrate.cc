@@ -108,7 +108,8 @@ int MoveToStart(std::optional<double> temperature_c,
   progress.Say("calibrating on the first 40 s");
   const auto start = FindStart(
       first->recording.get(), known, recorded->unknown, temperature_c);
-  // A calibration in this process leaves 100 MB of free memory behind.
+  // Tracking needs less memory than the calibration that has ended: the rest is
+  // returned.
   malloc_trim(0);
   progress.Clear();
   if (start.ok()) {
@@ -270,10 +271,9 @@ void AddCalibrate(CLI::App* app, Context* context) {
       "calibrate",
       "Calibrate on recordings of images and readings: tracks features, "
       "estimates the motion (a map of maplab has both), keeps the most "
-      "informative segments and "
-      "calibrates on them; needs no daemon. A further call with the same "
-      "--output continues. Exits with 0 if the result is good, with 5 if it is "
-      "weak, with 1 if it is not trustworthy");
+      "informative segments and calibrates on them; needs no daemon. A further "
+      "call with the same --output continues. Exits with 0 if the result is "
+      "good, with 5 if it is weak, with 1 if it is not trustworthy");
   const auto input = std::make_shared<CalibrateInput>();
   input->rig.id = "device";
   AddRecordingsOptions(command, &input->recordings);

@@ -33,8 +33,8 @@ struct ViMapOptions {
   bool good_landmarks_only = true;  // only landmarks of quality 2
 };
 
-// Whether the folder is a VI-map, holds submap_0, a VI-map, or is the vi_map/
-// within one, for which ReadViMap names the right folder.
+// Returns true for a folder that is a VI-map or holds submap_0, a VI-map, and
+// for the vi_map/ within one, for which ReadViMap names the right folder.
 bool IsViMap(const std::string& folder);
 
 // Reads the map in `folder`, or, if it holds submap_0, submap_1, ..., all of

@@ -34,9 +34,8 @@ namespace selfcal {
 // noise added to every IMU reading and every pixel: the noise of the round's
 // rig, that of pixels times pixel_factor. `round` and the rest are those of the
 // calibration at its minimum, with a basis of no columns and a loss that suits
-// residuals of this noise; `segments` and
-// `partitioning` are those of its problem. Returns nullopt if the states reach
-// no minimum.
+// residuals of this noise; `segments` and `partitioning` are those of its
+// problem. Returns nullopt if the states reach no minimum.
 std::optional<Eigen::MatrixXd> InformationUnderNoise(
     const SolverRound& round,
     const std::vector<const MotionSegment*>& segments,

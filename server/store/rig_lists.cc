@@ -87,7 +87,7 @@ absl::StatusOr<Place> PlaceOf(const RigQuery& query, const Page& page) {
 // Up to this number of names with a text, all of them are read and sorted.
 constexpr std::int64_t kFewNames = 2000;
 
-// Whether few names contain the text of the query.
+// Returns true if the text of the query is in few names.
 absl::StatusOr<bool> FindsFewNames(Connection* db, const RigQuery& query) {
   if (query.text.empty()) return false;
   SqlCondition condition;

@@ -157,7 +157,7 @@ class Adapter {
   const Calibration& calibration() const { return calibration_; }
   // Newest state, in the frames of that calibration, at the exposure.
   const std::optional<KeyframeState>& state() const { return state_; }
-  // Whether Basalt has settled since it has begun, and is plausible.
+  // True if Basalt has settled since it has begun, and is plausible.
   bool healthy() const { return healthy_; }
   // Empty, or why the newest calibration was not applied.
   const std::string& problem() const { return problem_; }
@@ -272,7 +272,7 @@ class Adapter {
     odometry_->AddImages(TimeOf(images), images.images);
   }
 
-  // Whether the output of images is still to come whose readings are there.
+  // Returns true while output is missing of images whose readings are there.
   bool IsBusy() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return std::any_of(

@@ -62,18 +62,26 @@ const kParts: Record<string, string> = {
   p_CI: 'position to the IMU',
 };
 
+// The name of a block that is the slope of another one with temperature ends so.
+const kSlope = '_slope';
+
+// cam0.focal_slope.x
+export function isSlope(name: string): boolean {
+  return name.split('.').some((part) => part.endsWith(kSlope));
+}
+
 // cam0.focal.x -> focal length of camera 0, x
 export function component(name: string): string {
   const [device, first, ...rest] = name.split('.');
   const say = (part: string): string =>
-    part.endsWith('_slope')
-      ? `${say(part.slice(0, -'_slope'.length))} per kelvin`
+    part.endsWith(kSlope)
+      ? `${say(part.slice(0, -kSlope.length))} per kelvin`
       : (kParts[part] ?? part.replaceAll('_', ' '));
   const camera = /^cam(\d+)$/.exec(device);
   if (camera && first) {
     return [`${say(first)} of camera ${camera[1]}`, ...rest].join(', ');
   }
-  if (first === 'q_AI' || first === 'q_AI_slope') {
+  if (first === 'q_AI' || first === 'q_AI' + kSlope) {
     return [say(first), ...rest].join(', ');
   }
   if (device === 'imu' && rest.length > 0) {

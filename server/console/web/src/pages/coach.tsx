@@ -7,7 +7,7 @@ import type {
   AdviseMotionResponse_MissingDirection,
   AdviseMotionResponse_WeakDirection,
 } from '../contract';
-import { component, number, shownUnit, sigmaText, words } from '../format';
+import { component, isSlope, number, shownUnit, sigmaText, words } from '../format';
 import { Link, Problem, Title } from '../parts';
 import { useCalm, useRead } from '../state';
 import { DataTable, type Column } from '../table';
@@ -61,8 +61,6 @@ function Best(props: { of: AdviseMotionResponse_Advice; seconds: number }) {
 
 // Directions that are listed for a lesson; the least known come first.
 const kShownDirections = 3;
-// The part of the name of a block that is the slope of another one.
-const kSlope = '_slope';
 
 function percent(part: number): string {
   return (100 * part).toFixed(part < 0.1 ? 1 : 0) + ' %';
@@ -83,15 +81,15 @@ function Directions(props: { of: AdviseMotionResponse_MissingDirection[]; taught
   );
 }
 
-// What has to be recorded until no direction is missing, as `selfcal rig coach`
-// prints it.
+// The recordings that remain until no direction is missing, as `selfcal rig
+// coach` prints them.
 function Plan(props: { of: AdviseMotionResponse }) {
   const { lessons, missing } = props.of;
   const untaught = missing.filter((m) => m.motion === '');
-  const isSlope = (m: AdviseMotionResponse_MissingDirection) =>
-    m.parts.some((part) => part.component.includes(kSlope));
-  const slopes = untaught.filter(isSlope);
-  const rest = untaught.filter((m) => !isSlope(m));
+  const isOfTemperature = (m: AdviseMotionResponse_MissingDirection) =>
+    m.parts.some((part) => isSlope(part.component));
+  const slopes = untaught.filter(isOfTemperature);
+  const rest = untaught.filter((m) => !isOfTemperature(m));
   return (
     <>
       <h2>To be recorded</h2>
