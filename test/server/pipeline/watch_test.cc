@@ -85,6 +85,9 @@ TEST_F(WatchTest, ARollBackIsToldAsTheNewest) {
   const auto first = Watch(&early);
   Recalibrate(1);
   Recalibrate(2);
+  // A run has ended before its version is told; a roll-back in between would
+  // take its place.
+  ASSERT_TRUE(Eventually([&] { return early.values().size() == 3; }));
   ASSERT_TRUE(pipeline_->ActivateCalibration("a", 2, "me", "drifts").ok());
   const auto second = Watch(&late);
   // What is active is not told again.
