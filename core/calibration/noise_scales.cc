@@ -275,11 +275,12 @@ double ShareOfImages(const SolverRound& round,
       scales[IndexOf(NoiseKind::kGyro)].redundancy / (kImagesDecide * rows));
 }
 
-// The maximum from this start.
+// The maximum from this start. Takes the problem, whose linear system is large,
+// so that it ends here.
 std::vector<NoiseScale> ScalesFrom(const NoiseVector& start,
                                    const NoiseVector& taken,
-                                   NoiseProblem* problem) {
-  Likelihood likelihood(problem, taken);
+                                   NoiseProblem problem) {
+  Likelihood likelihood(&problem, taken);
   if (!likelihood.MoveTo(start)) return {};
   const std::optional<Maximum> maximum = Maximise(&likelihood);
   if (!maximum) return {};
@@ -307,7 +308,6 @@ std::vector<NoiseScale> EstimateNoiseScales(
     const CalibrationEstimate& estimate,
     const std::vector<ScreenedLandmark>& landmarks,
     double track_noise) {
-  NoiseProblem problem(round, estimate, landmarks, track_noise);
   NoiseVector taken;
   for (int i = 0; i < kNoiseKinds; ++i) {
     const auto kind = static_cast<NoiseKind>(i);
@@ -316,20 +316,23 @@ std::vector<NoiseScale> EstimateNoiseScales(
   NoiseVector start = NoiseVector::Zero();
   start[IndexOf(NoiseKind::kPixel)] =
       std::log(GuessPixelFactor(round, estimate, landmarks));
-  std::vector<NoiseScale> scales = ScalesFrom(start, taken, &problem);
+  std::vector<NoiseScale> scales = ScalesFrom(
+      start, taken, NoiseProblem(round, estimate, landmarks, track_noise));
   if (scales.empty()) return scales;
   const double successive = SuccessiveNoiseRatio(round, estimate, landmarks);
   if (track_noise < kMuchInCommon * scales[IndexOf(NoiseKind::kPixel)].factor &&
       kMuchInCommon * successive > 1) {
     return scales;
   }
-  NoiseProblem apart(round,
-                     estimate,
-                     landmarks,
-                     0,
-                     std::pow(successive, ShareOfImages(round, scales)));
   for (int i = 0; i < kNoiseKinds; ++i) start[i] = std::log(scales[i].factor);
-  const std::vector<NoiseScale> others = ScalesFrom(start, taken, &apart);
+  const std::vector<NoiseScale> others = ScalesFrom(
+      start,
+      taken,
+      NoiseProblem(round,
+                   estimate,
+                   landmarks,
+                   0,
+                   std::pow(successive, ShareOfImages(round, scales))));
   if (others.empty()) return {};
   for (const NoiseKind kind : {NoiseKind::kGyro, NoiseKind::kAccel}) {
     const NoiseScale& other = others[IndexOf(kind)];
