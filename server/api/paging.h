@@ -19,22 +19,24 @@ inline constexpr int kMaxPageSize = 1000;
 // default. A client that reads page by page does not notice it.
 inline constexpr std::size_t kMaxPageBytes = 3u << 20;
 
-// Returns a page. `fetch` takes a Page and returns a StatusOr<Listed<T>>; `add`
-// takes a T and the response, and returns an absl::Status.
+// Returns a page of at most `max_size` items. `fetch` takes a Page and returns
+// a StatusOr<Listed<T>>; `add` takes a T and the response, and returns an
+// absl::Status.
 template <typename Response, typename Request, typename Fetch, typename Add>
 absl::StatusOr<Response> FillPage(const Request& request,
                                   const std::string& parent,
                                   const Fetch& fetch,
-                                  const Add& add) {
+                                  const Add& add,
+                                  int max_size = kMaxPageSize) {
   if (request.page_size() < 0) {
     return InvalidFields(
         {{"page_size", "is negative; send 0 for the default of 50"}});
   }
   Page page;
   page.token = request.page_token();
-  page.size = request.page_size() == 0
-                  ? kDefaultPageSize
-                  : std::min<int>(request.page_size(), kMaxPageSize);
+  page.size = std::min(
+      request.page_size() == 0 ? kDefaultPageSize : int{request.page_size()},
+      max_size);
   for (;;) {
     const auto listed = fetch(page);
     if (!listed.ok()) {

@@ -229,6 +229,23 @@ TEST_F(CalibrationServiceTest, ABasicListLacksTheDetails) {
   }
 }
 
+TEST_F(CalibrationServiceTest, APageHasFewerVersionsWithDetails) {
+  for (int i = 0; i < 17; ++i) {
+    ASSERT_TRUE(domain_->CreateRig(TestRig("r" + std::to_string(i))).ok());
+  }
+  v1::ListCalibrationsResponse page;
+  ASSERT_TRUE(List("", 0, "", &page).ok());
+  EXPECT_EQ(page.calibrations_size(), 15);
+  ASSERT_TRUE(List("", 1000, page.next_page_token(), &page).ok());
+  EXPECT_EQ(page.calibrations_size(), 2);
+  EXPECT_EQ(page.next_page_token(), "");
+  Context context;
+  v1::ListCalibrationsRequest request;
+  request.set_view(v1::ListCalibrationsRequest::BASIC);
+  ASSERT_TRUE(calibrations_->ListCalibrations(&context, request, &page).ok());
+  EXPECT_EQ(page.calibrations_size(), 17);
+}
+
 TEST_F(CalibrationServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
   v1::ListCalibrationsResponse page;
   EXPECT_THAT(BadFields(List("r", 0, "", &page)), ElementsAre("parent"));
