@@ -11,6 +11,8 @@
 
 #include "core/calibration/chain_thetas.h"
 #include "core/factor/ceres_factors.h"
+#include "core/factor/link_batch.h"
+#include "core/model/second_imu.h"
 #include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
@@ -20,15 +22,17 @@ namespace {
 struct KeyframeBlocks {
   std::array<double, 4> q;  // x, y, z, w
   std::array<double, 3> p;
-  std::array<double, 9> vb;
+  // Velocity and biases of each IMU.
+  std::array<std::array<double, 9>, kMaxImus> vb;
 };
 
 KeyframeBlocks ToBlocks(const KeyframeState& x) {
   KeyframeBlocks blocks;
   Eigen::Map<Eigen::Vector4d>(blocks.q.data()) = x.q_GI.coeffs();
   Eigen::Map<Eigen::Vector3d>(blocks.p.data()) = x.p_GI;
-  Eigen::Map<Eigen::Matrix<double, 9, 1>>(blocks.vb.data()) << x.v_GI, x.b_a,
-      x.b_g;
+  using Motion = Eigen::Map<Eigen::Matrix<double, 9, 1>>;
+  Motion(blocks.vb[0].data()) << x.v_GI, x.b_a, x.b_g;
+  Motion(blocks.vb[1].data()) << x.v_GJ, x.b_a1, x.b_g1;
   return blocks;
 }
 
@@ -36,10 +40,15 @@ void FromBlocks(const KeyframeBlocks& blocks, KeyframeState* x) {
   x->q_GI.coeffs() = Eigen::Map<const Eigen::Vector4d>(blocks.q.data());
   x->q_GI.normalize();
   x->p_GI = Eigen::Map<const Eigen::Vector3d>(blocks.p.data());
-  const Eigen::Map<const Eigen::Matrix<double, 9, 1>> vb(blocks.vb.data());
-  x->v_GI = vb.head<3>();
-  x->b_a = vb.segment<3>(3);
-  x->b_g = vb.tail<3>();
+  using Motion = Eigen::Map<const Eigen::Matrix3d>;
+  const Motion vb(blocks.vb[0].data());
+  x->v_GI = vb.col(0);
+  x->b_a = vb.col(1);
+  x->b_g = vb.col(2);
+  const Motion vb1(blocks.vb[1].data());
+  x->v_GJ = vb1.col(0);
+  x->b_a1 = vb1.col(1);
+  x->b_g1 = vb1.col(2);
 }
 
 // rho'' is set to zero, so that Ceres weights residuals as in iteratively
@@ -78,6 +87,7 @@ class Builder {
           const std::vector<ScreenedLandmark>& landmarks)
       : round_(round),
         thetas_(round.reference, round.problem),
+        imus_(ImuCount(round.reference)),
         d_(estimate.d),
         rotation_(MakeRotationManifold()),
         gauge_(MakeGaugeRotationManifold()),
@@ -106,7 +116,9 @@ class Builder {
     for (KeyframeBlocks& x : keyframes_) {
       ordering->AddElementToGroup(x.q.data(), 1);
       ordering->AddElementToGroup(x.p.data(), 1);
-      ordering->AddElementToGroup(x.vb.data(), 1);
+      for (int imu = 0; imu < imus_; ++imu) {
+        ordering->AddElementToGroup(x.vb[imu].data(), 1);
+      }
     }
     ordering->AddElementToGroup(d_.data(), 2);
     return ordering;
@@ -155,7 +167,9 @@ class Builder {
     for (KeyframeBlocks& x : keyframes_) {
       problem_.AddParameterBlock(x.q.data(), 4, rotation_.get());
       problem_.AddParameterBlock(x.p.data(), 3);
-      problem_.AddParameterBlock(x.vb.data(), 9);
+      for (int imu = 0; imu < imus_; ++imu) {
+        problem_.AddParameterBlock(x.vb[imu].data(), 9);
+      }
     }
     for (const int k : round_.problem.gauge_keyframes) {
       problem_.SetManifold(keyframes_[k].q.data(), gauge_.get());
@@ -170,13 +184,15 @@ class Builder {
       KeyframeBlocks& b = keyframes_[links[i].after];
       const auto& states = round_.problem.keyframes;
       const int chain = thetas_.IndexOf(links[i].before);
+      const int imu = links[i].imu;
       problem_.AddResidualBlock(
           ByTheta(chain,
                   MakeInertialCost(thetas_[chain],
+                                   imu,
                                    links[i].samples,
                                    states[links[i].before].t_ns,
                                    states[links[i].after].t_ns,
-                                   round_.rig.imu_noise,
+                                   NoiseOfImu(round_.rig, imu),
                                    round_.rig.gravity_mps2,
                                    round_.whitening[i]))
               .release(),
@@ -184,16 +200,16 @@ class Builder {
           d_.data(),
           a.q.data(),
           a.p.data(),
-          a.vb.data(),
+          a.vb[imu].data(),
           b.q.data(),
           b.p.data(),
-          b.vb.data());
+          b.vb[imu].data());
     }
     for (const BiasLink& link : round_.problem.bias_links) {
       problem_.AddResidualBlock(MakeBiasWalkCost(link.sigmas).release(),
                                 nullptr,
-                                keyframes_[link.before].vb.data(),
-                                keyframes_[link.after].vb.data());
+                                keyframes_[link.before].vb[0].data(),
+                                keyframes_[link.after].vb[0].data());
     }
   }
 
@@ -242,6 +258,7 @@ class Builder {
 
   const SolverRound& round_;
   const ChainThetas thetas_;  // at the reference
+  const int imus_;
   Eigen::VectorXd d_;
   std::vector<KeyframeBlocks> keyframes_;
   std::vector<Eigen::Vector3d> positions_;

@@ -8,6 +8,7 @@
 #include "core/calibration/linear_observations.h"
 #include "core/calibration/linear_point.h"
 #include "core/elimination/chain_elimination.h"
+#include "core/model/second_imu.h"
 
 namespace selfcal {
 
@@ -39,14 +40,16 @@ struct ChainPlan {
   HalfWalk walk_in, walk_out;
 
   int keyframes() const { return range.end - range.begin; }
-  ChainShape Shape(int link_size, std::span<const LandmarkRows> cameras) const {
+  ChainShape Shape(const Calibration& theta_s,
+                   std::span<const LandmarkRows> cameras) const {
     return {keyframes(),
-            link_size,
+            LinkTangentSize(theta_s),
             cameras,
             tracks,
             track_keyframes,
             static_cast<int>(interface.size()),
-            kept_landmarks};
+            kept_landmarks,
+            StateTangentSize(theta_s) - kChainPoseSize};
   }
 };
 

@@ -1,6 +1,8 @@
 #include "core/calibration/linear_motion.h"
 
+#include "core/information/linearisation.h"
 #include "core/information/weak_priors.h"
+#include "core/model/second_imu.h"
 
 namespace selfcal {
 namespace {
@@ -19,36 +21,33 @@ constexpr double kSmallGyroBias_radps = 0.1;
 
 double Information(double sigma) { return 1 / (sigma * sigma); }
 
-ChainStateMatrix WeakPrior() {
-  ChainStateMatrix weak = ChainStateMatrix::Zero();
+ChainStateMatrix WeakPrior(int size) {
+  ChainStateMatrix weak = MotionPrior(size);
   weak.diagonal().segment<3>(kStateRotation).array() =
       Information(kTiltPriorSigma_rad);
-  weak.diagonal().segment<3>(kStateVelocity).array() =
-      Information(kVelocityPriorSigma_mps);
-  weak.diagonal().segment<3>(kStateAccelBias).array() =
-      Information(kAccelBiasPriorSigma_mps2);
-  weak.diagonal().segment<3>(kStateGyroBias).array() =
-      Information(kGyroBiasPriorSigma_radps);
   return weak;
 }
 
 // Steps within which factors are approximately linear.
-ChainStateMatrix SmallSteps() {
-  ChainStateMatrix small = ChainStateMatrix::Zero();
+ChainStateMatrix SmallSteps(int size) {
+  ChainStateMatrix small = ChainStateMatrix::Zero(size, size);
   small.diagonal().segment<3>(kStateRotation).array() =
       Information(kSmallTilt_rad);
-  small.diagonal().segment<3>(kStateVelocity).array() =
-      Information(kSmallVelocity_mps);
-  small.diagonal().segment<3>(kStateAccelBias).array() =
-      Information(kSmallAccelBias_mps2);
-  small.diagonal().segment<3>(kStateGyroBias).array() =
-      Information(kSmallGyroBias_radps);
+  for (int motion = 0; motion + kStateTangentSize <= size;
+       motion += kMotionTangentSize) {
+    const auto set = [&](int at, double sigma) {
+      small.diagonal().segment<3>(motion + at).array() = Information(sigma);
+    };
+    set(kStateVelocity, kSmallVelocity_mps);
+    set(kStateAccelBias, kSmallAccelBias_mps2);
+    set(kStateGyroBias, kSmallGyroBias_radps);
+  }
   return small;
 }
 
 // Information about position and rotation about gravity.
-ChainStateMatrix GaugePrior(const KeyframeState& x) {
-  ChainStateMatrix gauge = ChainStateMatrix::Zero();
+ChainStateMatrix GaugePriorOf(const KeyframeState& x, int size) {
+  ChainStateMatrix gauge = ChainStateMatrix::Zero(size, size);
   const Eigen::Vector3d up_I = x.q_GI.conjugate() * Eigen::Vector3d::UnitZ();
   gauge.block<3, 3>(kStateRotation, kStateRotation) =
       Information(kGaugeSigma_rad) * up_I * up_I.transpose();
@@ -62,23 +61,30 @@ ChainStateMatrix GaugePrior(const KeyframeState& x) {
 void LinearMotion::Linearise(const LinearPoint& point,
                              std::span<const InertialNoiseRoot> roots) {
   const std::vector<InertialLink>& links = point.problem.inertial_links;
-  link_after_.assign(point.keyframes.size(), -1);
-  places_.resize(links.size());
+  links_ = static_cast<int>(links.size());
+  places_.assign(point.keyframes.size(), {});
   transitions_.resize(point.thetas.size());
   for (int t = 0; t < point.thetas.size(); ++t) {
-    states_.clear();
-    roots_.clear();
+    for (int imu = 0; imu < kMaxImus; ++imu) {
+      states_[imu].clear();
+      roots_[imu].clear();
+    }
     for (std::size_t i = 0; i < links.size(); ++i) {
-      if (point.thetas.IndexOf(links[i].before) != t) continue;
-      places_[i] = {t, static_cast<int>(states_.size())};
-      states_.push_back({&point.keyframes[links[i].before],
-                         &point.keyframes[links[i].after],
-                         links[i].samples});
-      roots_.push_back(roots[i]);
-      link_after_[links[i].before] = static_cast<int>(i);
+      const InertialLink& link = links[i];
+      if (point.thetas.IndexOf(link.before) != t) continue;
+      // The links of each IMU are in the same order.
+      std::vector<InertialLinkStates>& states = states_[link.imu];
+      Place& place = places_[link.before];
+      place.theta = t;
+      place.index = static_cast<int>(states.size());
+      place.links[link.imu] = static_cast<int>(i);
+      states.push_back({&point.keyframes[link.before],
+                        &point.keyframes[link.after],
+                        link.samples});
+      roots_[link.imu].push_back(roots[i]);
     }
     inertial_.LineariseWithRoots(states_,
-                                 point.thetas[t].imu,
+                                 point.thetas[t],
                                  point.rig.gravity_mps2,
                                  roots_,
                                  &transitions_[t]);
@@ -87,22 +93,47 @@ void LinearMotion::Linearise(const LinearPoint& point,
 
 double LinearMotion::Squares() const {
   double squares = 0;
-  for (int i = 0; i < links(); ++i) {
-    const std::span whitened(transition(i).whitened, kChainStateSize);
-    for (const double r : whitened) squares += r * r;
+  for (const Place& place : places_) {
+    if (place.index < 0) continue;
+    const LinkTransitions& transitions = transitions_[place.theta];
+    for (int imu = 0; imu < transitions.imus(); ++imu) {
+      for (const double r : transitions.Whitened(place.index, imu)) {
+        squares += r * r;
+      }
+    }
   }
   return squares;
 }
 
+void LinearMotion::AddPosterior(int keyframe,
+                                const ChainNoiseVector& noise,
+                                const ChainNoiseMatrix& covariance,
+                                LinearPosterior* posterior) const {
+  const Place& place = places_[keyframe];
+  const LinkTransitions& transitions = transitions_[place.theta];
+  const ChainNoiseVector of_imus = transitions.NoiseOfImus(place.index, noise);
+  const ChainNoiseMatrix covariance_of_imus =
+      transitions.CovarianceOfImus(place.index, covariance);
+  for (int imu = 0; imu < transitions.imus(); ++imu) {
+    const int at = imu * kChainStateSize;
+    const int link = place.links[imu];
+    posterior->inertial[link] = of_imus.segment<kChainStateSize>(at);
+    posterior->inertial_covariance[link] =
+        covariance_of_imus.block<kChainStateSize, kChainStateSize>(at, at);
+  }
+}
+
 void KeyframePriors::Set(const LinearPoint& point, double damping) {
-  information_.assign(point.keyframes.size(), ChainStateMatrix::Zero());
+  const int size = StateTangentSize(point.rig.factory);
+  information_.assign(point.keyframes.size(),
+                      ChainStateMatrix::Zero(size, size));
   present_.assign(point.keyframes.size(), false);
   for (const int k : point.problem.chain_starts) {
-    information_[k] += WeakPrior() + damping * SmallSteps();
+    information_[k] += WeakPrior(size) + damping * SmallSteps(size);
     present_[k] = true;
   }
   for (const int k : point.problem.gauge_keyframes) {
-    information_[k] += GaugePrior(point.keyframes[k]);
+    information_[k] += GaugePriorOf(point.keyframes[k], size);
     present_[k] = true;
   }
 }

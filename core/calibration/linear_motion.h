@@ -2,12 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
 #include "core/calibration/linear_point.h"
+#include "core/calibration/linear_posterior.h"
 #include "core/elimination/chain_unknowns.h"
-#include "core/factor/inertial_batch.h"
+#include "core/factor/link_batch.h"
 
 namespace selfcal {
 
@@ -21,30 +23,38 @@ class LinearMotion {
   void Linearise(const LinearPoint& point,
                  std::span<const InertialNoiseRoot> roots);
 
-  int links() const { return static_cast<int>(places_.size()); }
-  int keyframes() const { return static_cast<int>(link_after_.size()); }
-  // Index of the link between a keyframe and the next, which must exist.
-  int LinkAfter(int keyframe) const { return link_after_[keyframe]; }
-  InertialTransition transition(int link) const {
-    const Place& place = places_[link];
+  // Number of links of all IMUs.
+  int links() const { return links_; }
+  int keyframes() const { return static_cast<int>(places_.size()); }
+  // The factors between a keyframe and the next, which must be connected.
+  ChainTransition TransitionAfter(int keyframe) const {
+    const Place& place = places_[keyframe];
     return transitions_[place.theta][place.index];
   }
+  // Adds the posterior of the noise of that transition, by inertial link of the
+  // problem.
+  void AddPosterior(int keyframe,
+                    const ChainNoiseVector& noise,
+                    const ChainNoiseMatrix& covariance,
+                    LinearPosterior* posterior) const;
   // Sum of all squared whitened residuals.
   double Squares() const;
 
  private:
-  // A link, by its theta_s and its index among the links with the same.
+  // The transition after a keyframe: its theta_s, its index among those with
+  // the same, and the link of each IMU.
   struct Place {
-    int theta;
-    int index;
+    int theta = -1;
+    int index = -1;
+    std::array<int, kMaxImus> links = {};
   };
 
-  InertialBatch inertial_;
-  std::vector<InertialLinkStates> states_;
-  std::vector<InertialNoiseRoot> roots_;
-  std::vector<Place> places_;                     // by link
-  std::vector<InertialTransitions> transitions_;  // by theta
-  std::vector<int> link_after_;
+  LinkBatch inertial_;
+  LinksOfImus states_;
+  RootsOfImus roots_;
+  std::vector<Place> places_;                 // by keyframe
+  std::vector<LinkTransitions> transitions_;  // by theta
+  int links_ = 0;
 };
 
 // Information x^T H x about the step of a keyframe's state, where the factors

@@ -123,9 +123,8 @@ LinearPosterior LinearSystem::FindPosterior(
     for (int k = plan.range.begin; k < plan.range.end; ++k) {
       const int i = k - plan.range.begin;
       if (k + 1 < plan.range.end) {
-        const int link = motion_.LinkAfter(k);
-        result.inertial[link] = of_chain.noise[i];
-        result.inertial_covariance[link] = of_chain.noise_covariance[i];
+        motion_.AddPosterior(
+            k, of_chain.noise[i], of_chain.noise_covariance[i], &result);
         inertial_squares += of_chain.noise[i].squaredNorm();
       }
       if (const ChainStateMatrix* prior = priors_.Of(k)) {
@@ -152,8 +151,9 @@ LinearPosterior LinearSystem::FindPosterior(
       plan_.walk_squares + motion_.Squares() - decrease_ -
       theta_step.dot(2 * information_.eta - information_.Lambda * theta_step) -
       inertial_squares - result.walk_squares.sum() - result.prior_squares;
-  result.unknowns = kChainStateSize * motion_.keyframes() +
-                    3 * result.landmarks + result.walk_rows / 2;
+  result.unknowns =
+      motion_.keyframes() * static_cast<int>(states.front().size()) +
+      3 * result.landmarks + result.walk_rows / 2;
   return result;
 }
 

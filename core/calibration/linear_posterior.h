@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/elimination/chain_unknowns.h"
+#include "core/factor/inertial.h"
 
 namespace selfcal {
 
@@ -15,8 +15,8 @@ struct LinearPosterior {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
 
   // Whitened residual of each inertial link, and its covariance.
-  std::vector<ChainStateVector> inertial;
-  std::vector<ChainStateMatrix> inertial_covariance;
+  std::vector<InertialResidual> inertial;
+  std::vector<InertialMatrix> inertial_covariance;
   // Sums over bias links, by component. The redundancy is the number of links
   // minus the absorbed part.
   Vector6 walk_squares, walk_redundancy;

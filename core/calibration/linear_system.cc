@@ -20,7 +20,7 @@ void LinearSystem::EliminateChain(const LinearPoint& point,
   for (const CameraCalibration& camera : theta.cameras) {
     cameras.push_back(RowsOf(camera));
   }
-  elimination->Start(plan.Shape(ImuTangentSize(theta.imu), cameras),
+  elimination->Start(plan.Shape(theta, cameras),
                      ChainElimination::Record::kSteps);
   const KeyframeChain& range = plan.range;
   for (int k = range.begin; k < range.end; ++k) {
@@ -43,7 +43,7 @@ void LinearSystem::EliminateChain(const LinearPoint& point,
     }
     if (k == range.begin) add_half(plan.walk_in);
     if (k + 1 == range.end) break;
-    elimination->Advance(motion_.transition(motion_.LinkAfter(k)));
+    elimination->Advance(motion_.TransitionAfter(k));
   }
   add_half(plan.walk_out);
   elimination->Finish(result);

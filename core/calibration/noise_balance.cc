@@ -4,13 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/second_imu.h"
+
 namespace selfcal {
 namespace {
 
-constexpr NoiseKind kInertialKinds[] = {NoiseKind::kGyro,
-                                        NoiseKind::kAccel,
-                                        NoiseKind::kGyroBiasWalk,
-                                        NoiseKind::kAccelBiasWalk};
+// The kinds of the first IMU.
+constexpr NoiseKind kInertialKinds[kNoiseKindsOfImu] = {
+    NoiseKind::kGyro,
+    NoiseKind::kAccel,
+    NoiseKind::kGyroBiasWalk,
+    NoiseKind::kAccelBiasWalk};
 
 constexpr std::size_t kMinObservations = 2;
 
@@ -56,26 +60,31 @@ double Consistency(const RobustLoss& loss, double variance) {
 
 }  // namespace
 
-std::vector<NoiseProblem::LinkNoise> NoiseProblem::SplitInertialNoise(
+template <int kinds>
+std::vector<typename NoiseProblem<kinds>::LinkNoise>
+NoiseProblem<kinds>::SplitInertialNoise(
     const SolverRound& round,
     const ChainThetas& thetas,
     const std::vector<KeyframeState>& keyframes) {
-  std::array<ImuNoise, kNoiseKinds> alone;
-  for (const NoiseKind kind : kInertialKinds) {
-    Rig rig = round.rig;
-    for (const NoiseKind other : kInertialKinds) {
-      if (other != kind) ScaleNoise(other, 0, &rig);
+  std::array<ImuNoise, kinds> alone;
+  for (int imu = 0; imu < ImuCount(round.reference); ++imu) {
+    for (const NoiseKind kind : kInertialKinds) {
+      Rig rig = round.rig;
+      for (const NoiseKind other : kInertialKinds) {
+        if (other != kind) ScaleNoise(OfImu(other, imu), 0, &rig);
+      }
+      alone[IndexOf(OfImu(kind, imu))] = NoiseOfImu(rig, imu);
     }
-    alone[IndexOf(kind)] = rig.imu_noise;
   }
   std::vector<LinkNoise> split;
   for (const InertialLink& link : round.problem.inertial_links) {
     const auto covariance = [&](const ImuNoise& noise) {
+      const Calibration& theta = thetas.OfKeyframe(link.before);
       InertialMatrix covariance;
       EvaluateInertial(link.samples,
-                       keyframes[link.before],
-                       keyframes[link.after],
-                       thetas.OfKeyframe(link.before).imu,
+                       StateOfImu(theta, link.imu, keyframes[link.before]),
+                       StateOfImu(theta, link.imu, keyframes[link.after]),
+                       ImuOf(theta, link.imu),
                        noise,
                        round.rig.gravity_mps2,
                        nullptr,
@@ -83,21 +92,23 @@ std::vector<NoiseProblem::LinkNoise> NoiseProblem::SplitInertialNoise(
       return covariance;
     };
     LinkNoise& noise = split.emplace_back();
+    noise.imu = link.imu;
     noise.gaps = covariance({0, 0, 0, 0});
-    noise.kinds.fill(InertialMatrix::Zero());
-    for (const NoiseKind kind : kInertialKinds) {
-      noise.kinds[IndexOf(kind)] =
-          covariance(alone[IndexOf(kind)]) - noise.gaps;
+    for (int i = 0; i < kNoiseKindsOfImu; ++i) {
+      const NoiseKind kind = OfImu(kInertialKinds[i], link.imu);
+      noise.of_kinds[i] = covariance(alone[IndexOf(kind)]) - noise.gaps;
     }
   }
   return split;
 }
 
-NoiseProblem::NoiseProblem(const SolverRound& round,
-                           const CalibrationEstimate& estimate,
-                           const std::vector<ScreenedLandmark>& landmarks,
-                           double track_noise,
-                           double least_excess)
+template <int kinds>
+NoiseProblem<kinds>::NoiseProblem(
+    const SolverRound& round,
+    const CalibrationEstimate& estimate,
+    const std::vector<ScreenedLandmark>& landmarks,
+    double track_noise,
+    double least_excess)
     : round_(round),
       estimate_(estimate),
       track_noise_(track_noise),
@@ -111,11 +122,12 @@ NoiseProblem::NoiseProblem(const SolverRound& round,
       problem_(round.problem),
       whitening_(round.whitening) {}
 
-std::optional<NoiseBalance> NoiseProblem::Evaluate(
-    const NoiseVector& log_factors) {
-  const NoiseVector factors = log_factors.array().exp();
+template <int kinds>
+std::optional<NoiseBalance<kinds>> NoiseProblem<kinds>::Evaluate(
+    const Vector& log_factors) {
+  const Vector factors = log_factors.array().exp();
   rig_ = round_.rig;
-  for (int i = 0; i < kNoiseKinds; ++i) {
+  for (int i = 0; i < kinds; ++i) {
     ScaleNoise(static_cast<NoiseKind>(i), factors[i], &rig_);
   }
   ScaleLandmarks(factors[IndexOf(NoiseKind::kPixel)]);
@@ -137,7 +149,8 @@ std::optional<NoiseBalance> NoiseProblem::Evaluate(
 }
 
 // The common errors of a track do not depend on the pixel sigma.
-void NoiseProblem::ScaleLandmarks(double pixel_factor) {
+template <int kinds>
+void NoiseProblem<kinds>::ScaleLandmarks(double pixel_factor) {
   const double excess = std::max(least_excess_, track_noise_ / pixel_factor);
   for (ScreenedLandmark& landmark : landmarks_) {
     landmark.weight *= excess_ * excess_ / (excess * excess);
@@ -145,12 +158,14 @@ void NoiseProblem::ScaleLandmarks(double pixel_factor) {
   excess_ = excess;
 }
 
-void NoiseProblem::ScaleInertial(const NoiseVector& factors) {
+template <int kinds>
+void NoiseProblem<kinds>::ScaleInertial(const Vector& factors) {
   for (std::size_t i = 0; i < inertial_.size(); ++i) {
     InertialMatrix covariance = inertial_[i].gaps;
-    for (const NoiseKind kind : kInertialKinds) {
+    for (int k = 0; k < kNoiseKindsOfImu; ++k) {
+      const NoiseKind kind = OfImu(kInertialKinds[k], inertial_[i].imu);
       const double factor = factors[IndexOf(kind)];
-      covariance += factor * factor * inertial_[i].kinds[IndexOf(kind)];
+      covariance += factor * factor * inertial_[i].of_kinds[k];
     }
     whitening_[i] = SquareRootInformation(covariance);
   }
@@ -163,8 +178,9 @@ void NoiseProblem::ScaleInertial(const NoiseVector& factors) {
   }
 }
 
-NoiseBalance NoiseProblem::Count(const NoiseVector& factors,
-                                 const RobustLoss& loss) const {
+template <int kinds>
+NoiseBalance<kinds> NoiseProblem<kinds>::Count(const Vector& factors,
+                                               const RobustLoss& loss) const {
   // The minimising step of theta, and its covariance.
   const Eigen::MatrixXd& basis = round_.basis;
   Eigen::VectorXd step = Eigen::VectorXd::Zero(basis.rows());
@@ -182,7 +198,7 @@ NoiseBalance NoiseProblem::Count(const NoiseVector& factors,
       linearised_.system.FindPosterior(linearised_.theta_by_offset * step,
                                        moves * inverse * moves.transpose(),
                                        landmarks_);
-  NoiseBalance balance;
+  Balance balance;
   AddMotion(factors, posterior, &balance);
 
   AddPixels(posterior,
@@ -194,7 +210,9 @@ NoiseBalance NoiseProblem::Count(const NoiseVector& factors,
 }
 
 // Part of the unknowns that the prior on theta absorbs, if there is one.
-double NoiseProblem::AbsorbedByPrior(const Eigen::MatrixXd& inverse) const {
+template <int kinds>
+double NoiseProblem<kinds>::AbsorbedByPrior(
+    const Eigen::MatrixXd& inverse) const {
   if (round_.prior_information == nullptr) return 0;
   return inverse
       .cwiseProduct(round_.basis.transpose() * *round_.prior_information *
@@ -202,9 +220,10 @@ double NoiseProblem::AbsorbedByPrior(const Eigen::MatrixXd& inverse) const {
       .sum();
 }
 
-void NoiseProblem::AddMotion(const NoiseVector& factors,
-                             const LinearPosterior& posterior,
-                             NoiseBalance* balance) const {
+template <int kinds>
+void NoiseProblem<kinds>::AddMotion(const Vector& factors,
+                                    const LinearPosterior& posterior,
+                                    Balance* balance) const {
   const auto add = [&](NoiseKind kind, double squares, double redundancy) {
     balance->squares[IndexOf(kind)] += squares;
     balance->redundancy[IndexOf(kind)] += redundancy;
@@ -217,10 +236,10 @@ void NoiseProblem::AddMotion(const NoiseVector& factors,
     const InertialMatrix left =
         W.transpose() *
         (InertialMatrix::Identity() - posterior.inertial_covariance[i]) * W;
-    for (const NoiseKind kind : kInertialKinds) {
+    for (int k = 0; k < kNoiseKindsOfImu; ++k) {
+      const NoiseKind kind = OfImu(kInertialKinds[k], inertial_[i].imu);
       const double factor = factors[IndexOf(kind)];
-      const InertialMatrix noise =
-          factor * factor * inertial_[i].kinds[IndexOf(kind)];
+      const InertialMatrix noise = factor * factor * inertial_[i].of_kinds[k];
       add(kind, by_noise.dot(noise * by_noise), noise.cwiseProduct(left).sum());
     }
   }
@@ -233,13 +252,14 @@ void NoiseProblem::AddMotion(const NoiseVector& factors,
 }
 
 // Reprojections absorb the remaining unknowns, which no other kind absorbs.
-void NoiseProblem::AddPixels(const LinearPosterior& posterior,
-                             double unknowns,
-                             const RobustLoss& loss,
-                             NoiseBalance* balance) const {
+template <int kinds>
+void NoiseProblem<kinds>::AddPixels(const LinearPosterior& posterior,
+                                    double unknowns,
+                                    const RobustLoss& loss,
+                                    Balance* balance) const {
   if (posterior.observations == 0) return;
   double absorbed = unknowns - posterior.prior_absorbed - posterior.walk_rows;
-  for (const ChainStateMatrix& C : posterior.inertial_covariance) {
+  for (const InertialMatrix& C : posterior.inertial_covariance) {
     absorbed -= C.trace();
   }
   absorbed += posterior.walk_redundancy.sum();
@@ -253,5 +273,8 @@ void NoiseProblem::AddPixels(const LinearPosterior& posterior,
   balance->squares[IndexOf(NoiseKind::kPixel)] =
       posterior.pixel_squares / Consistency(loss, redundancy / rows);
 }
+
+template class NoiseProblem<kNoiseKinds>;
+template class NoiseProblem<kMaxNoiseKinds>;
 
 }  // namespace selfcal

@@ -23,20 +23,25 @@
 
 namespace selfcal {
 
-// Indexed by NoiseKind.
-using NoiseVector = Eigen::Matrix<double, kNoiseKinds, 1>;
-
-constexpr int IndexOf(NoiseKind kind) { return static_cast<int>(kind); }
+// Indexed by NoiseKind, of which there are kNoiseKinds, or with a second IMU
+// kMaxNoiseKinds.
+template <int kinds>
+using NoiseVector = Eigen::Matrix<double, kinds, 1>;
 
 // Squares of whitened residuals at the minimum, and the part of them that the
 // unknowns do not absorb: equal on average if the whitening is right.
+template <int kinds>
 struct NoiseBalance {
-  NoiseVector squares = NoiseVector::Zero();
-  NoiseVector redundancy = NoiseVector::Zero();
+  NoiseVector<kinds> squares = NoiseVector<kinds>::Zero();
+  NoiseVector<kinds> redundancy = NoiseVector<kinds>::Zero();
 };
 
+template <int kinds>
 class NoiseProblem {
  public:
+  using Vector = NoiseVector<kinds>;
+  using Balance = NoiseBalance<kinds>;
+
   // The arguments are those of EstimateNoiseScales; they must outlive this. The
   // noise of pixels relative to all other factors is their scale times
   // `least_excess`, or the track noise if that is larger. Below one, weights of
@@ -48,7 +53,7 @@ class NoiseProblem {
                double least_excess = 1);
 
   // Returns nullopt if the linear system fails.
-  std::optional<NoiseBalance> Evaluate(const NoiseVector& log_factors);
+  std::optional<Balance> Evaluate(const Vector& log_factors);
 
   // Returns true if, at the last noise scales, the weight of reprojections
   // relative to all other factors depended on the pixel sigma.
@@ -56,10 +61,11 @@ class NoiseProblem {
 
  private:
   // Parts of the covariance of one link at unit noise scales: that of each kind
-  // (zero for pixels), and that of gaps between samples. A random walk affects
-  // the motion as well as the biases.
+  // of its IMU, and that of gaps between samples. A random walk affects the
+  // motion as well as the biases.
   struct LinkNoise {
-    std::array<InertialMatrix, kNoiseKinds> kinds;
+    int imu = 0;
+    std::array<InertialMatrix, kNoiseKindsOfImu> of_kinds;
     InertialMatrix gaps;
   };
 
@@ -68,16 +74,16 @@ class NoiseProblem {
       const ChainThetas& thetas,
       const std::vector<KeyframeState>& keyframes);
   void ScaleLandmarks(double pixel_factor);
-  void ScaleInertial(const NoiseVector& factors);
-  NoiseBalance Count(const NoiseVector& factors, const RobustLoss& loss) const;
+  void ScaleInertial(const Vector& factors);
+  Balance Count(const Vector& factors, const RobustLoss& loss) const;
   double AbsorbedByPrior(const Eigen::MatrixXd& inverse) const;
-  void AddMotion(const NoiseVector& factors,
+  void AddMotion(const Vector& factors,
                  const LinearPosterior& posterior,
-                 NoiseBalance* balance) const;
+                 Balance* balance) const;
   void AddPixels(const LinearPosterior& posterior,
                  double unknowns,
                  const RobustLoss& loss,
-                 NoiseBalance* balance) const;
+                 Balance* balance) const;
 
   const SolverRound& round_;
   const CalibrationEstimate& estimate_;

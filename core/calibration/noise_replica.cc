@@ -27,12 +27,10 @@ class NoiseSource {
   std::normal_distribution<double> normal_;
 };
 
-MotionSegment WithNoise(const MotionSegment& segment,
-                        const Rig& rig,
-                        double pixel_factor,
-                        NoiseSource* noise) {
-  MotionSegment noisy = segment;
-  const std::vector<ImuSample>& imu = segment.imu;
+void AddNoise(const ImuNoise& density,
+              NoiseSource* noise,
+              std::vector<ImuSample>* readings) {
+  std::vector<ImuSample>& imu = *readings;
   for (std::size_t i = 0; i < imu.size(); ++i) {
     const std::size_t next = std::min(i + 1, imu.size() - 1);
     const std::size_t last = next > 0 ? next - 1 : 0;
@@ -40,9 +38,18 @@ MotionSegment WithNoise(const MotionSegment& segment,
         1e-9 * static_cast<double>(imu[next].t_ns - imu[last].t_ns);
     if (!(dt_s > 0)) continue;
     const double root = 1 / std::sqrt(dt_s);
-    noise->Add(rig.imu_noise.gyro_noise_density * root, &noisy.imu[i].gyro);
-    noise->Add(rig.imu_noise.accel_noise_density * root, &noisy.imu[i].accel);
+    noise->Add(density.gyro_noise_density * root, &imu[i].gyro);
+    noise->Add(density.accel_noise_density * root, &imu[i].accel);
   }
+}
+
+MotionSegment WithNoise(const MotionSegment& segment,
+                        const Rig& rig,
+                        double pixel_factor,
+                        NoiseSource* noise) {
+  MotionSegment noisy = segment;
+  AddNoise(rig.imu_noise, noise, &noisy.imu);
+  AddNoise(rig.imu1_noise, noise, &noisy.imu1);
   for (Observation& seen : noisy.observations) {
     noise->Add(pixel_factor * rig.pixel_sigma_px, &seen.z_px);
   }

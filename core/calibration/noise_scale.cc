@@ -24,19 +24,18 @@ constexpr double kLeastChange = 0.05;
 // A reference into a Rig or a const Rig.
 template <typename AnyRig>
 auto& Noise(NoiseKind kind, AnyRig& rig) {
-  switch (kind) {
-    case NoiseKind::kPixel:
-      return rig.pixel_sigma_px;
+  if (kind == NoiseKind::kPixel) return rig.pixel_sigma_px;
+  auto& noise = ImuOf(kind) == 0 ? rig.imu_noise : rig.imu1_noise;
+  switch (OfFirstImu(kind)) {
     case NoiseKind::kGyro:
-      return rig.imu_noise.gyro_noise_density;
+      return noise.gyro_noise_density;
     case NoiseKind::kAccel:
-      return rig.imu_noise.accel_noise_density;
+      return noise.accel_noise_density;
     case NoiseKind::kGyroBiasWalk:
-      return rig.imu_noise.gyro_bias_random_walk;
-    case NoiseKind::kAccelBiasWalk:
-      break;
+      return noise.gyro_bias_random_walk;
+    default:
+      return noise.accel_bias_random_walk;
   }
-  return rig.imu_noise.accel_bias_random_walk;
 }
 
 double LeastNoise(NoiseKind kind, const Rig& stated) {
@@ -49,23 +48,22 @@ double LeastNoise(NoiseKind kind, const Rig& stated) {
 }  // namespace
 
 std::string NoiseKindName(NoiseKind kind) {
+  if (kind == NoiseKind::kPixel) return "pixel";
+  if (ImuOf(kind) > 0) return "imu1_" + NoiseKindName(OfFirstImu(kind));
   switch (kind) {
-    case NoiseKind::kPixel:
-      return "pixel";
     case NoiseKind::kGyro:
       return "gyro";
     case NoiseKind::kAccel:
       return "accel";
     case NoiseKind::kGyroBiasWalk:
       return "gyro_bias_walk";
-    case NoiseKind::kAccelBiasWalk:
-      break;
+    default:
+      return "accel_bias_walk";
   }
-  return "accel_bias_walk";
 }
 
 std::optional<NoiseKind> FindNoiseKind(const std::string& name) {
-  for (int i = 0; i < kNoiseKinds; ++i) {
+  for (int i = 0; i < kMaxNoiseKinds; ++i) {
     const auto kind = static_cast<NoiseKind>(i);
     if (NoiseKindName(kind) == name) return kind;
   }
@@ -109,11 +107,12 @@ std::optional<Rig> Reweight(const Rig& stated,
 double LargestNoise(const std::vector<NoiseScale>& scales, double track_noise) {
   double largest = 1;
   for (const NoiseScale& scale : scales) {
-    if (scale.kind == NoiseKind::kGyroBiasWalk ||
-        scale.kind == NoiseKind::kAccelBiasWalk) {
+    const bool pixel = scale.kind == NoiseKind::kPixel;
+    if (!pixel && (OfFirstImu(scale.kind) == NoiseKind::kGyroBiasWalk ||
+                   OfFirstImu(scale.kind) == NoiseKind::kAccelBiasWalk)) {
       continue;
     }
-    const double tracks = scale.kind == NoiseKind::kPixel ? track_noise : 1;
+    const double tracks = pixel ? track_noise : 1;
     largest = std::max(largest, scale.used * tracks);
   }
   return largest;

@@ -10,15 +10,35 @@
 
 namespace selfcal {
 
-// Kinds of noise, in the order of NoiseScales.
+// Kinds of noise, in the order of NoiseScales. The last four are those of a
+// second IMU, in the order of the first one's.
 enum class NoiseKind {
   kPixel,
   kGyro,
   kAccel,
   kGyroBiasWalk,
   kAccelBiasWalk,
+  kSecondGyro,
+  kSecondAccel,
+  kSecondGyroBiasWalk,
+  kSecondAccelBiasWalk,
 };
-inline constexpr int kNoiseKinds = 5;
+inline constexpr int kNoiseKinds = 5;  // of a rig with one IMU
+inline constexpr int kNoiseKindsOfImu = kNoiseKinds - 1;
+inline constexpr int kMaxNoiseKinds = kNoiseKinds + kNoiseKindsOfImu;
+
+constexpr int IndexOf(NoiseKind kind) { return static_cast<int>(kind); }
+// The same kind of noise of an IMU; `kind` is that of the first.
+constexpr NoiseKind OfImu(NoiseKind kind, int imu) {
+  return static_cast<NoiseKind>(IndexOf(kind) + imu * kNoiseKindsOfImu);
+}
+// The IMU whose noise this is, and the kind for the first; not of pixels.
+constexpr int ImuOf(NoiseKind kind) {
+  return (IndexOf(kind) - 1) / kNoiseKindsOfImu;
+}
+constexpr NoiseKind OfFirstImu(NoiseKind kind) {
+  return OfImu(kind, -ImuOf(kind));
+}
 
 // A noise scale is determined if the standard deviation of its logarithm is
 // below this: two of them are then 20 %.
@@ -40,7 +60,8 @@ struct NoiseScale {
   bool determined() const { return log_sigma < kDeterminedLogSigma; }
 };
 
-// "pixel", "gyro", "accel", "gyro_bias_walk", "accel_bias_walk".
+// "pixel", "gyro", "accel", "gyro_bias_walk", "accel_bias_walk", and those with
+// "imu1_" before them.
 std::string NoiseKindName(NoiseKind kind);
 std::optional<NoiseKind> FindNoiseKind(const std::string& name);
 

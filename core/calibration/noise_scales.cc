@@ -8,11 +8,13 @@
 
 #include "core/calibration/noise_balance.h"
 #include "core/calibration/track_noise.h"
+#include "core/model/second_imu.h"
 
 namespace selfcal {
 namespace {
 
-using NoiseMatrix = Eigen::Matrix<double, kNoiseKinds, kNoiseKinds>;
+template <int kinds>
+using NoiseMatrix = Eigen::Matrix<double, kinds, kinds>;
 
 constexpr double Square(double x) { return x * x; }
 
@@ -51,9 +53,10 @@ constexpr double kImagesDecide = 0.5;
 
 // Prior information about the logarithms of the noise scales relative to the
 // stated noise.
-NoiseMatrix PriorInformation() {
-  NoiseMatrix covariance = NoiseMatrix::Constant(Square(kPriorLogSigma) -
-                                                 Square(kConditionalLogSigma));
+template <int kinds>
+NoiseMatrix<kinds> PriorInformation() {
+  NoiseMatrix<kinds> covariance = NoiseMatrix<kinds>::Constant(
+      Square(kPriorLogSigma) - Square(kConditionalLogSigma));
   constexpr int kPixel = IndexOf(NoiseKind::kPixel);
   covariance.row(kPixel).setZero();
   covariance.col(kPixel).setZero();
@@ -64,107 +67,137 @@ NoiseMatrix PriorInformation() {
 // Score and Fisher information of the logarithms of the noise scales, including
 // the prior. The Fisher information of a restricted likelihood follows from the
 // derivatives of the redundancies with respect to the scales.
+template <int kinds>
 class Likelihood {
+  using Vector = NoiseVector<kinds>;
+  using Matrix = NoiseMatrix<kinds>;
+
  public:
   // `taken`: logarithms of the noise of the problem relative to the stated
   // noise.
-  Likelihood(NoiseProblem* problem, const NoiseVector& taken)
+  Likelihood(NoiseProblem<kinds>* problem, const Vector& taken)
       : problem_(problem), taken_(taken) {}
 
-  bool MoveTo(const NoiseVector& at) {
-    const std::optional<NoiseBalance> balance = problem_->Evaluate(at);
+  bool MoveTo(const Vector& at) {
+    const std::optional<NoiseBalance<kinds>> balance = problem_->Evaluate(at);
     if (!balance) return false;
     at_ = at;
     balance_ = *balance;
     return true;
   }
 
-  const NoiseVector& at() const { return at_; }
-  const NoiseBalance& balance() const { return balance_; }
+  const Vector& at() const { return at_; }
+  const NoiseBalance<kinds>& balance() const { return balance_; }
 
-  NoiseVector Score() const {
+  Vector Score() const {
     return balance_.squares - balance_.redundancy - prior_ * (taken_ + at_);
   }
 
-  // Computed from two differences: a walk interacts with the noise of its own
-  // sensor only, so that the noise of each sensor is varied together with the
-  // walk of the other.
-  std::optional<NoiseMatrix> Fisher() const {
+  std::optional<Matrix> Fisher() const {
     constexpr int kPixel = IndexOf(NoiseKind::kPixel);
-    constexpr int kGyro = IndexOf(NoiseKind::kGyro);
-    constexpr int kAccel = IndexOf(NoiseKind::kAccel);
-    constexpr int kGyroWalk = IndexOf(NoiseKind::kGyroBiasWalk);
-    constexpr int kAccelWalk = IndexOf(NoiseKind::kAccelBiasWalk);
     const bool pixels_count = problem_->PixelsCount();
-    const auto a = Difference(kGyro, kAccelWalk);
-    const auto b = Difference(kAccel, kGyroWalk);
-    if (!a || !b) return std::nullopt;
-    NoiseMatrix by_factor = NoiseMatrix::Zero();
-    by_factor(kGyro, kGyro) = (*a)[kGyro];
-    by_factor(kAccel, kAccel) = (*b)[kAccel];
-    by_factor(kGyroWalk, kGyroWalk) = (*b)[kGyroWalk];
-    by_factor(kAccelWalk, kAccelWalk) = (*a)[kAccelWalk];
-    const double gyro_and_walk = (*a)[kGyroWalk];
-    const double accel_and_walk = (*b)[kAccelWalk];
-    SetBoth(kGyro, kGyroWalk, gyro_and_walk, &by_factor);
-    SetBoth(kAccel, kAccelWalk, accel_and_walk, &by_factor);
-    SetBoth(kGyro,
-            kAccel,
-            0.5 * ((*a)[kAccel] - accel_and_walk + (*b)[kGyro] - gyro_and_walk),
-            &by_factor);
+    Matrix by_factor = Matrix::Zero();
+    if (!FindDifferences(&by_factor)) return std::nullopt;
     // Redundancies do not change if all noise scales change by the same factor.
     if (pixels_count) {
-      for (int i = 1; i < kNoiseKinds; ++i) {
+      for (int i = 1; i < kinds; ++i) {
         SetBoth(kPixel, i, -by_factor.row(i).sum(), &by_factor);
       }
       by_factor(kPixel, kPixel) = -by_factor.row(kPixel).sum();
     }
-    NoiseMatrix fisher = -by_factor;
+    Matrix fisher = -by_factor;
     fisher.diagonal() += 2 * balance_.redundancy;
     // Differences may turn a zero eigenvalue into a negative one.
-    const Eigen::SelfAdjointEigenSolver<NoiseMatrix> eigen(fisher);
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(fisher);
     return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
                eigen.eigenvectors().transpose() +
            prior_;
   }
 
  private:
-  static void SetBoth(int i, int j, double value, NoiseMatrix* matrix) {
+  static void SetBoth(int i, int j, double value, Matrix* matrix) {
     (*matrix)(i, j) = (*matrix)(j, i) = value;
   }
 
-  // Difference quotient of the redundancies for a common change of the
-  // logarithms of two noise scales.
-  std::optional<NoiseVector> Difference(int i, int j) const {
-    const std::optional<NoiseBalance> moved = problem_->Evaluate(
-        at_ + kDifference * (NoiseVector::Unit(i) + NoiseVector::Unit(j)));
+  // Derivatives of the redundancies of inertial residuals with respect to the
+  // logarithms of their noise scales; those that concern pixels are not set.
+  // False if the linear system fails.
+  bool FindDifferences(Matrix* by_factor) const {
+    if constexpr (kinds == kNoiseKinds) {
+      return FindDifferencesOfOneImu(by_factor);
+    } else {
+      for (int i = 1; i < kinds; ++i) {
+        const auto change = Difference(Vector::Unit(i));
+        if (!change) return false;
+        by_factor->col(i).tail(kinds - 1) = change->tail(kinds - 1);
+      }
+      *by_factor = (0.5 * (*by_factor + by_factor->transpose())).eval();
+      return true;
+    }
+  }
+
+  // Computed from two differences: a walk interacts with the noise of its own
+  // sensor only, so that the noise of each sensor is varied together with the
+  // walk of the other.
+  bool FindDifferencesOfOneImu(Matrix* by_factor) const {
+    constexpr int kGyro = IndexOf(NoiseKind::kGyro);
+    constexpr int kAccel = IndexOf(NoiseKind::kAccel);
+    constexpr int kGyroWalk = IndexOf(NoiseKind::kGyroBiasWalk);
+    constexpr int kAccelWalk = IndexOf(NoiseKind::kAccelBiasWalk);
+    const auto a = Difference(Vector::Unit(kGyro) + Vector::Unit(kAccelWalk));
+    const auto b = Difference(Vector::Unit(kAccel) + Vector::Unit(kGyroWalk));
+    if (!a || !b) return false;
+    (*by_factor)(kGyro, kGyro) = (*a)[kGyro];
+    (*by_factor)(kAccel, kAccel) = (*b)[kAccel];
+    (*by_factor)(kGyroWalk, kGyroWalk) = (*b)[kGyroWalk];
+    (*by_factor)(kAccelWalk, kAccelWalk) = (*a)[kAccelWalk];
+    const double gyro_and_walk = (*a)[kGyroWalk];
+    const double accel_and_walk = (*b)[kAccelWalk];
+    SetBoth(kGyro, kGyroWalk, gyro_and_walk, by_factor);
+    SetBoth(kAccel, kAccelWalk, accel_and_walk, by_factor);
+    SetBoth(kGyro,
+            kAccel,
+            0.5 * ((*a)[kAccel] - accel_and_walk + (*b)[kGyro] - gyro_and_walk),
+            by_factor);
+    return true;
+  }
+
+  // Difference quotient of the redundancies for a change of the logarithms of
+  // noise scales.
+  std::optional<Vector> Difference(const Vector& direction) const {
+    const std::optional<NoiseBalance<kinds>> moved =
+        problem_->Evaluate(at_ + kDifference * direction);
     if (!moved) return std::nullopt;
     return (moved->redundancy - balance_.redundancy) / kDifference;
   }
 
-  NoiseProblem* problem_;
-  const NoiseVector taken_;
-  const NoiseMatrix prior_ = PriorInformation();
-  NoiseVector at_ = NoiseVector::Zero();
-  NoiseBalance balance_;
+  NoiseProblem<kinds>* problem_;
+  const Vector taken_;
+  const Matrix prior_ = PriorInformation<kinds>();
+  Vector at_ = Vector::Zero();
+  NoiseBalance<kinds> balance_;
 };
 
 // The Fisher information and the point at which it was computed.
+template <int kinds>
 struct FisherEvaluation {
-  NoiseMatrix fisher;
-  NoiseVector at, redundancy;
+  NoiseMatrix<kinds> fisher;
+  NoiseVector<kinds> at, redundancy;
 };
 
-std::optional<FisherEvaluation> EvaluateFisher(const Likelihood& likelihood) {
-  const std::optional<NoiseMatrix> fisher = likelihood.Fisher();
+template <int kinds>
+std::optional<FisherEvaluation<kinds>> EvaluateFisher(
+    const Likelihood<kinds>& likelihood) {
+  const std::optional<NoiseMatrix<kinds>> fisher = likelihood.Fisher();
   if (!fisher) return std::nullopt;
-  return FisherEvaluation{
+  return FisherEvaluation<kinds>{
       *fisher, likelihood.at(), likelihood.balance().redundancy};
 }
 
-bool StillHolds(const FisherEvaluation& evaluation,
-                const Likelihood& likelihood) {
-  for (int i = 0; i < kNoiseKinds; ++i) {
+template <int kinds>
+bool StillHolds(const FisherEvaluation<kinds>& evaluation,
+                const Likelihood<kinds>& likelihood) {
+  for (int i = 0; i < kinds; ++i) {
     if (std::max(evaluation.redundancy[i], likelihood.balance().redundancy[i]) >
             kRelevantRedundancy &&
         std::abs(likelihood.at()[i] - evaluation.at[i]) > kMaxDistance) {
@@ -176,9 +209,11 @@ bool StillHolds(const FisherEvaluation& evaluation,
 
 // The tolerance is tight for kinds that may be determined; the others remain
 // guesses in any case.
-bool IsSettled(const NoiseVector& change, const FisherEvaluation& evaluation) {
-  const NoiseMatrix covariance = evaluation.fisher.inverse();
-  for (int i = 0; i < kNoiseKinds; ++i) {
+template <int kinds>
+bool IsSettled(const NoiseVector<kinds>& change,
+               const FisherEvaluation<kinds>& evaluation) {
+  const NoiseMatrix<kinds> covariance = evaluation.fisher.inverse();
+  for (int i = 0; i < kinds; ++i) {
     const double allowed = evaluation.redundancy[i] > kMayBeDetermined
                                ? kSettledSigmas
                                : kSettledSigmasOfGuess;
@@ -189,8 +224,9 @@ bool IsSettled(const NoiseVector& change, const FisherEvaluation& evaluation) {
   return true;
 }
 
+template <int kinds>
 struct Maximum {
-  NoiseMatrix fisher;
+  NoiseMatrix<kinds> fisher;
   bool converged = false;
 };
 
@@ -199,25 +235,28 @@ struct Maximum {
 // corrected by the observed change of the score in each step (Broyden). A step
 // that does not bring the score nearer to zero, in its own standard deviations,
 // is halved. Returns nullopt if the linear system fails.
-std::optional<Maximum> Maximise(Likelihood* likelihood) {
-  std::optional<FisherEvaluation> evaluation = EvaluateFisher(*likelihood);
+template <int kinds>
+std::optional<Maximum<kinds>> Maximise(Likelihood<kinds>* likelihood) {
+  using Vector = NoiseVector<kinds>;
+  std::optional<FisherEvaluation<kinds>> evaluation =
+      EvaluateFisher(*likelihood);
   if (!evaluation) return std::nullopt;
-  NoiseMatrix slope = evaluation->fisher;
-  const auto size_of = [&](const NoiseVector& score) {
+  NoiseMatrix<kinds> slope = evaluation->fisher;
+  const auto size_of = [&](const Vector& score) {
     return std::sqrt(score.dot(evaluation->fisher.ldlt().solve(score)));
   };
   for (int i = 0; i < kMaxSteps; ++i) {
-    const NoiseVector score = likelihood->Score();
-    NoiseVector change = slope.partialPivLu().solve(score);
+    const Vector score = likelihood->Score();
+    Vector change = slope.partialPivLu().solve(score);
     if (!change.allFinite() || change.dot(score) <= 0) {
       slope = evaluation->fisher;
       change = slope.ldlt().solve(score);
     }
     if (IsSettled(change, *evaluation))
-      return Maximum{evaluation->fisher, true};
-    const NoiseVector from = likelihood->at();
-    NoiseVector step = (0.5 * (1 + 2 * change.array()).max(kLeastPart).log())
-                           .min(kLongestStep);
+      return Maximum<kinds>{evaluation->fisher, true};
+    const Vector from = likelihood->at();
+    Vector step = (0.5 * (1 + 2 * change.array()).max(kLeastPart).log())
+                      .min(kLongestStep);
     const double before = size_of(score);
     for (int halving = 0;; ++halving) {
       if (!likelihood->MoveTo(from + step)) return std::nullopt;
@@ -227,7 +266,7 @@ std::optional<Maximum> Maximise(Likelihood* likelihood) {
       step *= 0.5;
     }
     if (StillHolds(*evaluation, *likelihood)) {
-      const NoiseVector shown = score - likelihood->Score();
+      const Vector shown = score - likelihood->Score();
       slope += (shown - slope * step) * step.transpose() / step.squaredNorm();
     } else {
       evaluation = EvaluateFisher(*likelihood);
@@ -235,7 +274,7 @@ std::optional<Maximum> Maximise(Likelihood* likelihood) {
       slope = evaluation->fisher;
     }
   }
-  return Maximum{evaluation->fisher, false};
+  return Maximum<kinds>{evaluation->fisher, false};
 }
 
 // Estimates the noise scale of pixels from the median residual, as if all
@@ -268,8 +307,12 @@ double GuessPixelFactor(const SolverRound& round,
 // apart.
 double ShareOfImages(const SolverRound& round,
                      const std::vector<NoiseScale>& scales) {
+  const auto& links = round.problem.inertial_links;
   const double rows =
-      3.0 * static_cast<double>(round.problem.inertial_links.size());
+      3.0 * static_cast<double>(std::count_if(
+                links.begin(), links.end(), [](const InertialLink& link) {
+                  return link.imu == 0;
+                }));
   return std::min(
       1.0,
       scales[IndexOf(NoiseKind::kGyro)].redundancy / (kImagesDecide * rows));
@@ -277,25 +320,71 @@ double ShareOfImages(const SolverRound& round,
 
 // The maximum from this start. Takes the problem, whose linear system is large,
 // so that it ends here.
-std::vector<NoiseScale> ScalesFrom(const NoiseVector& start,
-                                   const NoiseVector& taken,
-                                   NoiseProblem problem) {
-  Likelihood likelihood(&problem, taken);
+template <int kinds>
+std::vector<NoiseScale> ScalesFrom(const NoiseVector<kinds>& start,
+                                   const NoiseVector<kinds>& taken,
+                                   NoiseProblem<kinds> problem) {
+  Likelihood<kinds> likelihood(&problem, taken);
   if (!likelihood.MoveTo(start)) return {};
-  const std::optional<Maximum> maximum = Maximise(&likelihood);
+  const std::optional<Maximum<kinds>> maximum = Maximise(&likelihood);
   if (!maximum) return {};
-  const NoiseMatrix covariance = maximum->fisher.inverse();
+  const NoiseMatrix<kinds> covariance = maximum->fisher.inverse();
   std::vector<NoiseScale> scales;
-  for (int i = 0; i < kNoiseKinds; ++i) {
+  for (int i = 0; i < kinds; ++i) {
     const double redundancy = likelihood.balance().redundancy[i];
     // The information may have been computed at a distant point.
-    const double least = 1 / (2 * redundancy + PriorInformation()(i, i));
+    const double least = 1 / (2 * redundancy + PriorInformation<kinds>()(i, i));
     scales.push_back({static_cast<NoiseKind>(i),
                       std::exp(likelihood.at()[i]),
                       std::sqrt(std::max(covariance(i, i), least)),
                       redundancy,
                       1,
                       maximum->converged});
+  }
+  return scales;
+}
+
+template <int kinds>
+std::vector<NoiseScale> EstimateScales(
+    const Rig& stated,
+    const SolverRound& round,
+    const CalibrationEstimate& estimate,
+    const std::vector<ScreenedLandmark>& landmarks,
+    double track_noise) {
+  NoiseVector<kinds> taken;
+  for (int i = 0; i < kinds; ++i) {
+    const auto kind = static_cast<NoiseKind>(i);
+    taken[i] = std::log(NoiseOf(kind, round.rig) / NoiseOf(kind, stated));
+  }
+  NoiseVector<kinds> start = NoiseVector<kinds>::Zero();
+  start[IndexOf(NoiseKind::kPixel)] =
+      std::log(GuessPixelFactor(round, estimate, landmarks));
+  std::vector<NoiseScale> scales =
+      ScalesFrom(start,
+                 taken,
+                 NoiseProblem<kinds>(round, estimate, landmarks, track_noise));
+  if (scales.empty()) return scales;
+  const double successive = SuccessiveNoiseRatio(round, estimate, landmarks);
+  if (track_noise < kMuchInCommon * scales[IndexOf(NoiseKind::kPixel)].factor &&
+      kMuchInCommon * successive > 1) {
+    return scales;
+  }
+  for (int i = 0; i < kinds; ++i) start[i] = std::log(scales[i].factor);
+  const std::vector<NoiseScale> others = ScalesFrom(
+      start,
+      taken,
+      NoiseProblem<kinds>(round,
+                          estimate,
+                          landmarks,
+                          0,
+                          std::pow(successive, ShareOfImages(round, scales))));
+  if (others.empty()) return {};
+  for (int imu = 0; imu < ImuCount(stated.factory); ++imu) {
+    for (const NoiseKind kind : {NoiseKind::kGyro, NoiseKind::kAccel}) {
+      const NoiseScale& other = others[IndexOf(OfImu(kind, imu))];
+      NoiseScale& scale = scales[IndexOf(OfImu(kind, imu))];
+      if (other.factor > scale.factor) scale = other;
+    }
   }
   return scales;
 }
@@ -308,38 +397,11 @@ std::vector<NoiseScale> EstimateNoiseScales(
     const CalibrationEstimate& estimate,
     const std::vector<ScreenedLandmark>& landmarks,
     double track_noise) {
-  NoiseVector taken;
-  for (int i = 0; i < kNoiseKinds; ++i) {
-    const auto kind = static_cast<NoiseKind>(i);
-    taken[i] = std::log(NoiseOf(kind, round.rig) / NoiseOf(kind, stated));
-  }
-  NoiseVector start = NoiseVector::Zero();
-  start[IndexOf(NoiseKind::kPixel)] =
-      std::log(GuessPixelFactor(round, estimate, landmarks));
-  std::vector<NoiseScale> scales = ScalesFrom(
-      start, taken, NoiseProblem(round, estimate, landmarks, track_noise));
-  if (scales.empty()) return scales;
-  const double successive = SuccessiveNoiseRatio(round, estimate, landmarks);
-  if (track_noise < kMuchInCommon * scales[IndexOf(NoiseKind::kPixel)].factor &&
-      kMuchInCommon * successive > 1) {
-    return scales;
-  }
-  for (int i = 0; i < kNoiseKinds; ++i) start[i] = std::log(scales[i].factor);
-  const std::vector<NoiseScale> others = ScalesFrom(
-      start,
-      taken,
-      NoiseProblem(round,
-                   estimate,
-                   landmarks,
-                   0,
-                   std::pow(successive, ShareOfImages(round, scales))));
-  if (others.empty()) return {};
-  for (const NoiseKind kind : {NoiseKind::kGyro, NoiseKind::kAccel}) {
-    const NoiseScale& other = others[IndexOf(kind)];
-    NoiseScale& scale = scales[IndexOf(kind)];
-    if (other.factor > scale.factor) scale = other;
-  }
-  return scales;
+  return ImuCount(stated.factory) == 1
+             ? EstimateScales<kNoiseKinds>(
+                   stated, round, estimate, landmarks, track_noise)
+             : EstimateScales<kMaxNoiseKinds>(
+                   stated, round, estimate, landmarks, track_noise);
 }
 
 }  // namespace selfcal

@@ -50,7 +50,8 @@ bool Joinable(const MotionSegment& before, const MotionSegment& after) {
   const std::int64_t first_ns = after.keyframes.front().t_ns;
   return before.key.index + 1 == after.key.index &&
          before.keyframes.back().t_ns < first_ns &&
-         before.imu.back().t_ns >= first_ns;
+         before.imu.back().t_ns >= first_ns &&
+         (before.imu1.empty() || before.imu1.back().t_ns >= first_ns);
 }
 
 // Appends the partitions of one session to the result.

@@ -53,12 +53,12 @@ std::vector<const MotionSegment*> SortByKey(
     const std::vector<MotionSegment>& segments);
 
 // Partitions segments sorted by key. Two segments are joined if they belong to
-// one session, their indices are consecutive, and the samples of the first
-// extend to the first keyframe of the second. Partitions of one session are
-// merged as long as two of them observe more than merge_landmarks common ids,
-// counted over each whole partition: unlike a single pass over the segments,
-// that has one result whatever the order, and leaves no two partitions over the
-// threshold.
+// one session, their indices are consecutive, and the samples of the first, of
+// both IMUs, extend to the first keyframe of the second. Partitions of one
+// session are merged as long as two of them observe more than merge_landmarks
+// common ids, counted over each whole partition: unlike a single pass over the
+// segments, that has one result whatever the order, and leaves no two
+// partitions over the threshold.
 Partitioning PartitionSegments(
     const std::vector<const MotionSegment*>& segments, int merge_landmarks);
 

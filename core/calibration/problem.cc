@@ -11,22 +11,27 @@
 #include "core/calibration/track_depth.h"
 #include "core/factor/inertial.h"
 #include "core/factor/sampling.h"
+#include "core/model/second_imu.h"
 #include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
 
 void AddInertialLinks(const MotionSegment& segment,
+                      int imu,
                       int first_keyframe,
                       std::vector<InertialLink>* links) {
-  const std::span<const ImuSample> samples = SamplesFromFirstKeyframe(segment);
+  const std::span<const ImuSample> samples =
+      imu == 0 ? SamplesFromFirstKeyframe(segment)
+               : SecondSamplesFromFirstKeyframe(segment);
   for (std::size_t k = 1; k < segment.keyframes.size(); ++k) {
     const int after = first_keyframe + static_cast<int>(k);
-    links->push_back({after - 1,
-                      after,
-                      SamplesBetween(samples,
-                                     segment.keyframes[k - 1].t_ns,
-                                     segment.keyframes[k].t_ns)});
+    links->push_back(
+        {after - 1,
+         after,
+         SamplesBetween(
+             samples, segment.keyframes[k - 1].t_ns, segment.keyframes[k].t_ns),
+         imu});
   }
 }
 
@@ -134,26 +139,36 @@ CalibrationProblem FlattenSegments(
     const Partitioning& partitioning,
     const SharingLimits& limits) {
   CalibrationProblem problem;
+  const int imus = ImuCount(rig.factory);
   std::vector<int> first_keyframe;
   std::vector<bool> starts_chain(segments.size(), true);
   for (const MotionSegment* segment : segments) {
     first_keyframe.push_back(static_cast<int>(problem.keyframes.size()));
-    AddInertialLinks(*segment, first_keyframe.back(), &problem.inertial_links);
+    for (int imu = 0; imu < imus; ++imu) {
+      AddInertialLinks(
+          *segment, imu, first_keyframe.back(), &problem.inertial_links);
+    }
+    const SegmentTheta theta_s(rig.factory, *segment);
+    const StartedSegment started(*theta_s, *segment);
     problem.keyframes.insert(problem.keyframes.end(),
-                             segment->keyframes.begin(),
-                             segment->keyframes.end());
+                             (*started).keyframes.begin(),
+                             (*started).keyframes.end());
     for (std::size_t k = 0; k < segment->keyframes.size(); ++k) {
       problem.contexts.push_back(ContextOf(*segment, k));
     }
   }
   for (const SegmentJoint& joint : partitioning.joints) {
     const int after = first_keyframe[joint.after];
-    problem.inertial_links.push_back(
-        {after - 1,
-         after,
-         SamplesBetween(segments[joint.before]->imu,
-                        problem.keyframes[after - 1].t_ns,
-                        problem.keyframes[after].t_ns)});
+    const MotionSegment& before = *segments[joint.before];
+    for (int imu = 0; imu < imus; ++imu) {
+      problem.inertial_links.push_back(
+          {after - 1,
+           after,
+           SamplesBetween(imu == 0 ? before.imu : before.imu1,
+                          problem.keyframes[after - 1].t_ns,
+                          problem.keyframes[after].t_ns),
+           imu});
+    }
     starts_chain[joint.after] = false;
   }
   for (const SegmentGap& gap : partitioning.gaps) {

@@ -37,15 +37,17 @@ struct Track {
 // Index of the piece that contains an observation.
 int PieceOf(const Track& track, int observation);
 
-// The IMU samples that cover the time between two keyframes.
+// The samples of an IMU that cover the time between two keyframes.
 struct InertialLink {
   int before = 0;
   int after = 0;
   std::span<const ImuSample> samples;  // of the segment, which must outlive it
+  int imu = 0;
 };
 
 // Two consecutive remaining keyframes of one session, with removed keyframes
-// between them.
+// between them: the biases of the first IMU walk from one to the other. Those
+// of a second one are not linked.
 struct BiasLink {
   int before = 0;
   int after = 0;
@@ -53,7 +55,9 @@ struct BiasLink {
 };
 
 struct CalibrationProblem {
-  std::vector<KeyframeState> keyframes;  // as the SLAM system estimated them
+  // States as the SLAM system estimated them, with the motion of a second IMU
+  // as StartSecondImu begins it.
+  std::vector<KeyframeState> keyframes;
   // One for each keyframe. The samples are those of its segment, which must
   // outlive them.
   std::vector<KeyframeContext> contexts;
@@ -63,7 +67,7 @@ struct CalibrationProblem {
   std::vector<int> chain_starts;
   // Temperature of each chain [deg C]: the mean of its segments.
   std::vector<double> chain_temperatures_c;
-  std::vector<InertialLink> inertial_links;
+  std::vector<InertialLink> inertial_links;  // of both IMUs
   std::vector<BiasLink> bias_links;
   std::vector<Track> tracks;  // by (partition, id, time)
 };

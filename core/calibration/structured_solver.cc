@@ -8,7 +8,8 @@
 
 #include "core/calibration/landmark_position.h"
 #include "core/calibration/theta_information.h"
-#include "core/model/so3.h"
+#include "core/factor/link_batch.h"
+#include "core/model/second_imu.h"
 
 namespace selfcal {
 namespace {
@@ -31,14 +32,6 @@ constexpr double kMaxDamping = 1e6;
 // Landmarks at a trial point may together miss this fraction of the decrease
 // that the step predicts.
 constexpr double kRefineDecrease = 1e-4;
-
-void Move(const ChainStateVector& step, KeyframeState* x) {
-  x->q_GI = (x->q_GI * Exp(step.segment<3>(kStateRotation))).normalized();
-  x->p_GI += step.segment<3>(kStatePosition);
-  x->v_GI += step.segment<3>(kStateVelocity);
-  x->b_a += step.segment<3>(kStateAccelBias);
-  x->b_g += step.segment<3>(kStateGyroBias);
-}
 
 // First trial step of all unknowns.
 struct Direction {
@@ -100,21 +93,23 @@ double MotionSquares(const SolverRound& round,
                      const ChainThetas& thetas,
                      const std::vector<KeyframeState>& keyframes) {
   double sum = 0;
+  LinkBatch batch(WidestVectors());
   for (int t = 0; t < thetas.size(); ++t) {
-    std::vector<InertialLinkStates> links;
-    std::vector<InertialNoiseRoot> of_links;
-    for (std::size_t i = 0; i < roots.size(); ++i) {
-      const InertialLink& link = round.problem.inertial_links[i];
-      if (thetas.IndexOf(link.before) != t) continue;
-      links.push_back(
-          {&keyframes[link.before], &keyframes[link.after], link.samples});
-      of_links.push_back(roots[i]);
+    for (int imu = 0; imu < ImuCount(thetas[t]); ++imu) {
+      std::vector<InertialLinkStates> links;
+      std::vector<InertialNoiseRoot> of_links;
+      for (std::size_t i = 0; i < roots.size(); ++i) {
+        const InertialLink& link = round.problem.inertial_links[i];
+        if (thetas.IndexOf(link.before) != t || link.imu != imu) continue;
+        links.push_back(
+            {&keyframes[link.before], &keyframes[link.after], link.samples});
+        of_links.push_back(roots[i]);
+      }
+      std::vector<InertialResidual> residuals(links.size());
+      batch.Residuals(
+          links, thetas[t], imu, round.rig.gravity_mps2, of_links, residuals);
+      for (const InertialResidual& r : residuals) sum += r.squaredNorm();
     }
-    std::vector<InertialResidual> residuals(links.size());
-    InertialBatch(WidestVectors())
-        .Residuals(
-            links, thetas[t].imu, round.rig.gravity_mps2, of_links, residuals);
-    for (const InertialResidual& r : residuals) sum += r.squaredNorm();
   }
   for (const BiasLink& link : round.problem.bias_links) {
     const KeyframeState& a = keyframes[link.before];
@@ -265,7 +260,8 @@ class LineSearch {
     Trial trial{estimate_, positions_, 0};
     trial.estimate.d += length * direction_.d;
     for (std::size_t k = 0; k < direction_.keyframes.size(); ++k) {
-      Move(length * direction_.keyframes[k], &trial.estimate.keyframes[k]);
+      KeyframeState& x = trial.estimate.keyframes[k];
+      x = BoxPlus(x, length * direction_.keyframes[k]);
     }
     for (std::size_t i = 0; i < direction_.landmarks.size(); ++i) {
       trial.positions[i].Move(length * direction_.landmarks[i]);
@@ -332,7 +328,8 @@ void ApplyStep(const LinearisedRound& linearised,
       linearised.theta_by_offset * step_d, &keyframes, &positions);
   estimate->d += step_d;
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
-    Move(keyframes[k], &estimate->keyframes[k]);
+    KeyframeState& x = estimate->keyframes[k];
+    x = BoxPlus(x, keyframes[k]);
   }
   for (std::size_t i = 0; i < positions.size(); ++i) {
     (*landmarks)[i].position.Move(positions[i]);

@@ -1,5 +1,7 @@
 #include "core/calibration/theta_information.h"
 
+#include "core/model/second_imu.h"
+
 namespace selfcal {
 
 std::vector<InertialMatrix> WhitenInertialLinks(
@@ -11,11 +13,12 @@ std::vector<InertialMatrix> WhitenInertialLinks(
   whitening.reserve(problem.inertial_links.size());
   InertialMatrix covariance;
   for (const InertialLink& link : problem.inertial_links) {
+    const Calibration& theta = thetas.OfKeyframe(link.before);
     EvaluateInertial(link.samples,
-                     keyframes[link.before],
-                     keyframes[link.after],
-                     thetas.OfKeyframe(link.before).imu,
-                     rig.imu_noise,
+                     StateOfImu(theta, link.imu, keyframes[link.before]),
+                     StateOfImu(theta, link.imu, keyframes[link.after]),
+                     ImuOf(theta, link.imu),
+                     NoiseOfImu(rig, link.imu),
                      rig.gravity_mps2,
                      nullptr,
                      &covariance);

@@ -35,6 +35,10 @@ std::string ComponentInWords(std::string_view component) {
   std::string words;
   if (sensor == "imu") {
     words = Words(kImuBlocks, rest) + Words(kImuSlopes, rest);
+  } else if (sensor == "imu1") {
+    words = Words(kImuBlocks, rest) + Words(kMountBlocks, rest) +
+            Words(kImuSlopes, rest);
+    if (!words.empty()) words += " of the second IMU";
   } else if (sensor.starts_with("cam")) {
     words = Words(kCameraBlocks, rest) + Words(kCameraSlopes, rest);
     if (!words.empty()) {

@@ -64,11 +64,11 @@ void ChainElimination::AddPrior(const ChainStateMatrix& information) {
   for (int i = 0; i < kPose; ++i) {
     for (int j = 0; j <= i; ++j)
       front_(pose + i, pose + j) += information(i, j);
-    for (int j = 0; j < kMotion; ++j) {
+    for (int j = 0; j < layout_.motion_size; ++j) {
       front_(pose + i, motion + j) += information(i, kPose + j);
     }
   }
-  for (int i = 0; i < kMotion; ++i) {
+  for (int i = 0; i < layout_.motion_size; ++i) {
     for (int j = 0; j <= i; ++j) {
       front_(motion + i, motion + j) += information(kPose + i, kPose + j);
     }
@@ -92,7 +92,7 @@ void ChainElimination::AddKeptBias(int kept, const KeptBiasRows& rows) {
 void ChainElimination::AddKeptState(int kept,
                                     const ChainStateVector& information) {
   BeginKeyframe();
-  for (int m = 0; m < kState; ++m) {
+  for (int m = 0; m < information.size(); ++m) {
     const int state =
         m < kPose ? front_.Pose(0) + m : layout_.motion_place() + m - kPose;
     const int place = layout_.kept_place + kept + m;

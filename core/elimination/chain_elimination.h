@@ -14,7 +14,8 @@
 // symmetric front
 //   [link parameters | motion of a keyframe | kept | camera parameters | 1 |
 //    poses]
-// where the motion (velocity and biases) is that of the current keyframe, and
+// where the motion (velocity and biases of each IMU) is that of the current
+// keyframe, and
 // the kept unknowns are shared with other chains: landmarks that they observe
 // as well, biases that walk from one to the next, and states at which they are
 // joined. For tracks of bounded length the cost is linear in the number of
@@ -107,15 +108,15 @@ class ChainElimination {
   // if any, and the link to the next, or the end.
   void AddPrior(const ChainStateMatrix& information);
   void AddKeptBias(int kept, const KeptBiasRows& rows);
-  // Ties the state of the keyframe to 15 kept unknowns x: its offset from them
-  // has the given information, which must be positive.
+  // Ties the first unknowns of the state of the keyframe to as many kept ones:
+  // their offset has the given information, which must be positive.
   void AddKeptState(int kept, const ChainStateVector& information);
   void Advance(const ChainTransition& link);
   void Finish(SharedInformation* result);
 
   // After Finish(), with Record::kSteps: the minimising steps for a given step
-  // of the shared parameters. 15 for each keyframe, 3 for each landmark (p_G,
-  // [m]).
+  // of the shared parameters. Those of a state for each keyframe, 3 for each
+  // landmark (p_G, [m]).
   void FindSteps(const Eigen::VectorXd& shared,
                  std::vector<ChainStateVector>* states,
                  std::vector<Eigen::Vector3d>* landmarks) const;

@@ -16,6 +16,7 @@ struct ChainLayout {
   ChainLayout() = default;
   explicit ChainLayout(const ChainShape& shape)
       : link_size(shape.link_size),
+        motion_size(shape.motion_size),
         camera_shared(std::accumulate(shape.cameras.begin(),
                                       shape.cameras.end(),
                                       0,
@@ -23,13 +24,18 @@ struct ChainLayout {
                                         return sum + rows.shared;
                                       })),
         kept(shape.kept),
-        kept_place(TransitionColumns(link_size).constant),
+        kept_place(columns().constant),
         camera_place(kept_place + WholeVectors(kept)),
         constant(camera_place + camera_shared),
         fixed(WholeVectors(constant + 1)) {}
 
   // Link parameters, camera parameters and kept unknowns.
   int shared_size() const { return link_size + camera_shared + kept; }
+
+  int state_size() const { return chain::kPose + motion_size; }
+  TransitionColumns columns() const {
+    return TransitionColumns(link_size, motion_size);
+  }
 
   // Place of a shared parameter.
   int Place(int shared) const {
@@ -41,7 +47,8 @@ struct ChainLayout {
   // Place of the velocity of the current keyframe; its biases follow.
   int motion_place() const { return link_size; }
 
-  int link_size = 0;      // number of link parameters
+  int link_size = 0;  // number of link parameters
+  int motion_size = kChainMotionSize;
   int camera_shared = 0;  // number of camera parameters
   int kept = 0;           // number of kept unknowns
   int kept_place = 0;     // of the first kept unknown: the same as in G

@@ -13,11 +13,9 @@
 namespace selfcal::chain {
 
 inline constexpr int kPose = kChainPoseSize;
-inline constexpr int kMotion = kChainMotionSize;
-inline constexpr int kState = kChainStateSize;
 inline constexpr int kEliminated = -1;
-// The size of a state in whole tiles.
-inline constexpr int kTileState = 16;
+// The size of a state in whole tiles, at most.
+inline constexpr int kMaxTileState = WholeVectors(kMaxChainStateSize);
 // Zeros that must follow the valid entries of a panel: the rows of the largest
 // tile.
 inline constexpr int kZeros = 3 * kPanelPad;
@@ -26,6 +24,16 @@ inline constexpr int kPlacesBetweenMoves = 8;
 
 // Separate products of one factor with its pose.
 inline constexpr int kOwnPoseStride = WholeVectors(kPose);
+
+// Calls function.operator()<size>() for the size of a state.
+template <typename Function>
+void WithStateSize(int size, const Function& function) {
+  if (size == kChainStateSize) {
+    function.template operator()<kChainStateSize>();
+  } else {
+    function.template operator()<kMaxChainStateSize>();
+  }
+}
 
 template <typename Number>
 void GrowTo(std::size_t size, std::vector<Number>* buffer) {

@@ -20,9 +20,6 @@ using namespace chain;
 
 namespace {
 
-template <int columns>
-using RowMajorState =
-    Eigen::Map<const Eigen::Matrix<double, kState, columns, Eigen::RowMajor>>;
 using RowMajorPanel = Eigen::Map<
     const Eigen::
         Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>,
@@ -69,7 +66,13 @@ class PosePlaces {
 // The covariance of the front, by places: first the fixed part as in a panel,
 // then poses, each in one place as long as it is in the front. Values in other
 // places are finite, and not used.
+template <int kState>
 class CovarianceWalk {
+  static constexpr int kTileState = WholeVectors(kState);
+  using StateMatrix = Eigen::Matrix<double, kState, kState>;
+  using RowMajorState = Eigen::Map<
+      const Eigen::Matrix<double, kState, kTileState, Eigen::RowMajor>>;
+
  public:
   CovarianceWalk(const EliminatedChain& chain,
                  VectorWidth width,
@@ -120,15 +123,38 @@ class CovarianceWalk {
     }
   }
 
-  const ChainStateMatrix& state() const { return state_; }
-  // Covariance of the noise of its link.
-  ChainStateMatrix Noise(const ChainRecord::Step& step) const {
-    const auto factor = RowMajorState<kTileState>(&step.factor[0][0])
-                            .leftCols<kState>()
-                            .triangularView<Eigen::Upper>();
-    const ChainStateMatrix half =
-        factor.solve(ChainStateMatrix::Identity() + ByPanel(product_));
-    return factor.solve(half.transpose().eval());
+  const StateMatrix& state() const { return state_; }
+  // Noise of its link, for the values z of the front.
+  ChainNoiseVector Noise(const ChainRecord::Step& step,
+                         const Eigen::VectorXd& z,
+                         const ChainStateVector& next) const {
+    const RowMajorPanel P(record_.Product(step),
+                          kState,
+                          step.stride,
+                          Eigen::OuterStride<>(step.stride));
+    ChainNoiseVector noise(kState + step.rows);
+    noise.head<kState>() = -Factor(step).solve(P * z.head(step.stride));
+    if (step.rows > 0) {
+      const ChainTransition link = record_.Link(step);
+      const RowMajorPanel H = Rows(link);
+      const TransitionColumns& at = link.columns;
+      noise.tail(step.rows) =
+          H.leftCols(at.constant) * z.head(at.constant) + H.col(at.constant) +
+          H.middleCols<kPose>(at.next_pose) * next.head<kPose>();
+    }
+    return noise;
+  }
+  // Covariance of that.
+  ChainNoiseMatrix NoiseCovariance(const ChainRecord::Step& step,
+                                   std::span<const int> poses) const {
+    const auto factor = Factor(step);
+    const StateMatrix half =
+        factor.solve(StateMatrix::Identity() + ByPanel(product_));
+    ChainNoiseMatrix covariance(kState + step.rows, kState + step.rows);
+    covariance.topLeftCorner<kState, kState>() =
+        factor.solve(half.transpose().eval());
+    if (step.rows > 0) AddRows(step, poses, &covariance);
+    return covariance;
   }
   Eigen::MatrixXd WithShared() const {
     Eigen::MatrixXd columns(kState, layout_.shared_size());
@@ -141,6 +167,40 @@ class CovarianceWalk {
   }
 
  private:
+  auto Factor(const ChainRecord::Step& step) const {
+    return RowMajorState(record_.Factor(step))
+        .template leftCols<kState>()
+        .template triangularView<Eigen::Upper>();
+  }
+  static RowMajorPanel Rows(const ChainTransition& link) {
+    return {link.H,
+            link.rows,
+            link.columns.stride,
+            Eigen::OuterStride<>(link.columns.stride)};
+  }
+  // Adds that of the further rows H z of a link, with its noise and with each
+  // other.
+  void AddRows(const ChainRecord::Step& step,
+               std::span<const int> poses,
+               ChainNoiseMatrix* covariance) const {
+    const ChainTransition link = record_.Link(step);
+    const TransitionColumns& at = link.columns;
+    const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> front(
+        covariance_.data(), size_, size_, Eigen::OuterStride<>(stride_));
+    const RowMajorPanel product(
+        product_.data(), kState, size_, Eigen::OuterStride<>(stride_));
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(step.rows, size_);
+    H.leftCols(at.constant) = Rows(link).leftCols(at.constant);
+    H.middleCols<kPose>(PlaceOf(poses[1])) =
+        Rows(link).middleCols<kPose>(at.next_pose);
+    const Eigen::MatrixXd with_noise =
+        -Factor(step).solve(product * H.transpose());
+    covariance->topRightCorner(kState, step.rows) = with_noise;
+    covariance->bottomLeftCorner(step.rows, kState) = with_noise.transpose();
+    covariance->bottomRightCorner(step.rows, step.rows) =
+        H * front * H.transpose();
+  }
+
   double& At(int i, int j) {
     return covariance_[static_cast<std::size_t>(j) * stride_ + i];
   }
@@ -173,7 +233,9 @@ class CovarianceWalk {
     alignas(64) double G[kMaxTransitionColumns][kTileState] = {};
     const int kept_place = layout_.kept_place;
     for (int i = 0; i < kState; ++i) {
-      for (int j = 0; j < kState; ++j) root[j][i] = step.root[i][j];
+      for (int j = 0; j < kState; ++j) {
+        root[j][i] = record_.Root(step)[i * kTileState + j];
+      }
       if (!step.linked) continue;
       const ChainTransition link = record_.Link(step);
       const double* row = link.G + i * link.columns.stride;
@@ -215,7 +277,7 @@ class CovarianceWalk {
   }
 
   // The product of rows over the front with the transpose of P.
-  ChainStateMatrix ByPanel(const std::vector<double>& rows) const {
+  StateMatrix ByPanel(const std::vector<double>& rows) const {
     return RowMajorPanel(
                rows.data(), kState, size_, Eigen::OuterStride<>(stride_)) *
            RowMajorPanel(
@@ -225,7 +287,7 @@ class CovarianceWalk {
   // with_front_ (G - root P)^T, plus the state's own covariance.
   void SetState(const ChainRecord::Step& step, std::span<const int> poses) {
     const auto root =
-        RowMajorState<kTileState>(&step.root[0][0]).leftCols<kState>();
+        RowMajorState(record_.Root(step)).template leftCols<kState>();
     state_ = (root - ByPanel(with_front_)) * root.transpose();
     if (step.linked) {
       const ChainTransition link = record_.Link(step);
@@ -250,12 +312,38 @@ class CovarianceWalk {
   const int stride_;
   int size_ = 0;  // of the front, by places
   std::vector<double> covariance_;
-  // 15 rows over the front: P covariance, and the covariance of the state with
-  // the front.
+  // Rows of the state over the front: P covariance, and the covariance of the
+  // state with the front.
   std::vector<double> product_, with_front_;
   std::vector<double> panel_;
-  ChainStateMatrix state_;
+  StateMatrix state_;
 };
+
+template <int kState>
+void FindPosteriorOf(const EliminatedChain& chain,
+                     VectorWidth width,
+                     const Eigen::VectorXd& shared,
+                     const Eigen::MatrixXd& shared_covariance,
+                     const std::vector<ChainStateVector>& states,
+                     ChainPosterior* posterior) {
+  const int keyframes = chain.structure.keyframes();
+  Eigen::VectorXd z = SharedInPlaces(chain, shared);
+  CovarianceWalk<kState> walk(chain, width, shared_covariance);
+  for (int k = keyframes - 1; k >= 0; --k) {
+    const ChainRecord::Step& step = chain.record.step(k);
+    walk.Reverse(k);
+    posterior->state_covariance[k] = walk.state();
+    if (k + 1 == keyframes) posterior->last_with_shared = walk.WithShared();
+    if (k == 0) posterior->first_with_shared = walk.WithShared();
+    if (step.linked) {
+      PlaceStates(chain, k, states, &z);
+      posterior->noise[k] = walk.Noise(step, z, states[k + 1]);
+      posterior->noise_covariance[k] =
+          walk.NoiseCovariance(step, chain.structure.Poses(k));
+    }
+    if (k > 0) walk.Enter(k);
+  }
+}
 
 }  // namespace
 
@@ -269,28 +357,10 @@ void FindChainPosterior(const EliminatedChain& chain,
   posterior->noise.resize(keyframes - 1);
   posterior->noise_covariance.resize(keyframes - 1);
   posterior->state_covariance.resize(keyframes);
-  Eigen::VectorXd z = SharedInPlaces(chain, shared);
-  CovarianceWalk walk(chain, width, shared_covariance);
-  for (int k = keyframes - 1; k >= 0; --k) {
-    const ChainRecord::Step& step = chain.record.step(k);
-    walk.Reverse(k);
-    posterior->state_covariance[k] = walk.state();
-    if (k + 1 == keyframes) posterior->last_with_shared = walk.WithShared();
-    if (k == 0) posterior->first_with_shared = walk.WithShared();
-    if (step.linked) {
-      PlaceStates(chain, k, states, &z);
-      const RowMajorPanel P(chain.record.Product(step),
-                            kState,
-                            step.stride,
-                            Eigen::OuterStride<>(step.stride));
-      posterior->noise[k] = -RowMajorState<kTileState>(&step.factor[0][0])
-                                 .leftCols<kState>()
-                                 .triangularView<Eigen::Upper>()
-                                 .solve(P * z.head(step.stride));
-      posterior->noise_covariance[k] = walk.Noise(step);
-    }
-    if (k > 0) walk.Enter(k);
-  }
+  WithStateSize(chain.layout.state_size(), [&]<int kState>() {
+    FindPosteriorOf<kState>(
+        chain, width, shared, shared_covariance, states, posterior);
+  });
 }
 
 }  // namespace selfcal

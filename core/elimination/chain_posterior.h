@@ -14,13 +14,14 @@ namespace selfcal {
 // Posterior of a chain given all factors, the step and the covariance of the
 // shared parameters.
 struct ChainPosterior {
-  // The noise e of each link: its minimiser and its covariance, between zero
-  // and the identity, which is its prior.
-  std::vector<ChainStateVector> noise;
-  std::vector<ChainStateMatrix> noise_covariance;
+  // The noise e of each link, and the residuals H z of its further rows, which
+  // are noise as well: minimiser and covariance, between zero and the identity,
+  // which is their prior.
+  std::vector<ChainNoiseVector> noise;
+  std::vector<ChainNoiseMatrix> noise_covariance;
   std::vector<ChainStateMatrix> state_covariance;  // of each keyframe
-  // 15 x shared_size(): covariance of the first and of the last keyframe with
-  // the shared parameters.
+  // Rows of a state x shared_size(): covariance of the first and of the last
+  // keyframe with the shared parameters.
   Eigen::MatrixXd first_with_shared, last_with_shared;
 };
 

@@ -1,6 +1,6 @@
 #include "core/elimination/chain_record.h"
 
-#include <cstring>
+#include <algorithm>
 
 namespace selfcal {
 
@@ -10,7 +10,10 @@ void ChainRecord::Start(const ChainLayout& layout,
                         const ChainStructure& structure,
                         bool wanted) {
   wanted_ = wanted;
-  columns_ = TransitionColumns(layout.link_size);
+  columns_ = layout.columns();
+  state_ = layout.state_size();
+  tile_ = WholeVectors(state_);
+  roots_.clear();
   steps_.clear();
   products_.clear();
   transitions_.clear();
@@ -20,12 +23,16 @@ void ChainRecord::Start(const ChainLayout& layout,
   std::size_t size = 0;
   for (int k = 0; k < keyframes; ++k) {
     const int rest = static_cast<int>(structure.Poses(k).size()) - 1;
-    size += static_cast<std::size_t>(kState) * (layout.fixed + rest * kPose);
+    size += static_cast<std::size_t>(state_) * (layout.fixed + rest * kPose);
   }
   steps_.reserve(keyframes);
   products_.reserve(size);
-  transitions_.reserve(static_cast<std::size_t>(keyframes - 1) * kState *
-                       (columns_.stride + kTransitionNoise));
+  roots_.reserve(static_cast<std::size_t>(keyframes) * 2 * state_ * tile_);
+  const int rows =
+      state_ > kChainStateSize ? kMaxChainLinkRows : 0;  // of a link
+  transitions_.reserve(
+      static_cast<std::size_t>(keyframes - 1) *
+      (state_ * (columns_.stride + tile_) + rows * columns_.stride));
 }
 
 void ChainRecord::Add(const EliminatedState& state,
@@ -36,15 +43,22 @@ void ChainRecord::Add(const EliminatedState& state,
   step.stride = state.size;
   step.linked = link != nullptr;
   step.transition = transitions_.size();
+  step.rows = link != nullptr ? link->rows : 0;
   if (link != nullptr) {
-    transitions_.insert(
-        transitions_.end(), link->G, link->G + kState * columns_.stride);
-    transitions_.insert(
-        transitions_.end(), link->A, link->A + kState * kTransitionNoise);
+    const auto add = [&](const double* rows, int size) {
+      transitions_.insert(transitions_.end(), rows, rows + size);
+    };
+    add(link->G, state_ * columns_.stride);
+    add(link->A, state_ * tile_);
+    if (link->rows > 0) add(link->H, link->rows * columns_.stride);
   }
-  std::memcpy(step.root, state.root.root, sizeof(step.root));
-  std::memcpy(step.factor, state.root.factor, sizeof(step.factor));
-  for (int k = 0; k < kState; ++k) {
+  step.root = roots_.size();
+  for (const auto* rows : {&state.root.root, &state.root.factor}) {
+    for (int i = 0; i < state_; ++i) {
+      roots_.insert(roots_.end(), (*rows)[i], (*rows)[i] + tile_);
+    }
+  }
+  for (int k = 0; k < state_; ++k) {
     const double* row = state.product.data + k * state.product.stride;
     products_.insert(products_.end(), row, row + state.size);
   }

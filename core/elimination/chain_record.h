@@ -18,10 +18,10 @@ class ChainRecord {
   struct Step {
     std::size_t product;  // of its P in the products
     int stride;
-    double root[chain::kState][16];
-    double factor[chain::kState][16];
+    std::size_t root;  // of its root in the roots, and the factor behind it
     bool linked;
-    std::size_t transition;  // of its G in the transitions, and A behind it
+    std::size_t transition;  // of its G in the transitions; A and H follow
+    int rows;
   };
 
   // Begins a chain; unless it is `wanted`, nothing will be recorded.
@@ -33,22 +33,31 @@ class ChainRecord {
 
   bool wanted() const { return wanted_; }
   const Step& step(int k) const { return steps_[k]; }
-  // P of a step: 15 rows, `stride` apart.
+  // P of a step: the rows of a state, `stride` apart.
   const double* Product(const Step& step) const {
     return &products_[step.product];
   }
   // The link of a step that has one.
   ChainTransition Link(const Step& step) const {
     const double* G = &transitions_[step.transition];
-    return {columns_, G, G + chain::kState * columns_.stride};
+    const double* A = G + state_ * columns_.stride;
+    return {columns_, G, A, step.rows, A + state_ * tile_};
+  }
+  // Those of StateRoot: the rows of a state, of whole vectors.
+  const double* Root(const Step& step) const { return &roots_[step.root]; }
+  const double* Factor(const Step& step) const {
+    return Root(step) + state_ * tile_;
   }
 
  private:
   bool wanted_ = false;
   TransitionColumns columns_ = TransitionColumns(0);
+  int state_ = 0;              // its size
+  int tile_ = 0;               // the same in whole vectors
+  std::vector<double> roots_;  // of each step the root, then the factor
   std::vector<Step> steps_;
   std::vector<double> products_;
-  std::vector<double> transitions_;  // of each link G, then A
+  std::vector<double> transitions_;  // of each link G, then A and H
 };
 
 // A chain whose elimination was recorded.

@@ -4,6 +4,7 @@
 
 #include <span>
 
+#include "core/elimination/chain_unknowns.h"
 #include "core/elimination/landmark_rows.h"
 
 namespace selfcal {
@@ -21,6 +22,8 @@ struct ChainShape {
   // -1 if it is eliminated. Empty: all are eliminated.
   int kept = 0;
   std::span<const int> kept_landmarks = {};
+  // Number of unknowns of a keyframe besides its pose.
+  int motion_size = kChainMotionSize;
 };
 
 }  // namespace selfcal

@@ -10,9 +10,32 @@ using namespace chain;
 
 namespace {
 
-using RowMajorRoot = Eigen::Matrix<double, kState, kTileState, Eigen::RowMajor>;
 using RowMajorPanel =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+template <int kState>
+void FindStateStep(const EliminatedChain& chain,
+                   int k,
+                   const Eigen::VectorXd& z,
+                   const ChainStateVector* next,
+                   ChainStateVector* state) {
+  using RowMajorRoot =
+      Eigen::Matrix<double, kState, WholeVectors(kState), Eigen::RowMajor>;
+  const ChainRecord::Step& step = chain.record.step(k);
+  const Eigen::Map<const RowMajorPanel> P(
+      chain.record.Product(step), kState, step.stride);
+  const auto root = Eigen::Map<const RowMajorRoot>(chain.record.Root(step))
+                        .template leftCols<kState>();
+  Eigen::Matrix<double, kState, 1> x = -(root * (P * z.head(step.stride)));
+  if (step.linked) {
+    const ChainTransition link = chain.record.Link(step);
+    const TransitionColumns& at = link.columns;
+    const Eigen::Map<const RowMajorPanel> G(link.G, kState, at.stride);
+    x += G.leftCols(at.constant) * z.head(at.constant) + G.col(at.constant) +
+         G.middleCols<kPose>(at.next_pose) * next->head<kPose>();
+  }
+  *state = x;
+}
 
 }  // namespace
 
@@ -36,8 +59,8 @@ void PlaceStates(const EliminatedChain& chain,
         states[poses[s]].head<kPose>();
   }
   if (k + 1 < chain.structure.keyframes()) {
-    z->segment<kMotion>(chain.layout.motion_place()) =
-        states[k + 1].tail<kMotion>();
+    z->segment(chain.layout.motion_place(), chain.layout.motion_size) =
+        states[k + 1].tail(chain.layout.motion_size);
   }
 }
 
@@ -47,21 +70,12 @@ void FindStateSteps(const EliminatedChain& chain,
   const int keyframes = chain.structure.keyframes();
   states->resize(keyframes);
   for (int k = keyframes - 1; k >= 0; --k) {
-    const ChainRecord::Step& step = chain.record.step(k);
     PlaceStates(chain, k, *states, &z);
-    const Eigen::Map<const RowMajorPanel> P(
-        chain.record.Product(step), kState, step.stride);
-    const auto root =
-        Eigen::Map<const RowMajorRoot>(&step.root[0][0]).leftCols<kState>();
-    ChainStateVector& x = (*states)[k];
-    x = -(root * (P * z.head(step.stride)));
-    if (step.linked) {
-      const ChainTransition link = chain.record.Link(step);
-      const TransitionColumns& at = link.columns;
-      const Eigen::Map<const RowMajorPanel> G(link.G, kState, at.stride);
-      x += G.leftCols(at.constant) * z.head(at.constant) + G.col(at.constant) +
-           G.middleCols<kPose>(at.next_pose) * (*states)[k + 1].head<kPose>();
-    }
+    const ChainStateVector* next =
+        k + 1 < keyframes ? &(*states)[k + 1] : nullptr;
+    WithStateSize(chain.layout.state_size(), [&]<int kState>() {
+      FindStateStep<kState>(chain, k, z, next, &(*states)[k]);
+    });
   }
 }
 

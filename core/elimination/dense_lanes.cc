@@ -161,7 +161,7 @@ void DenseLanes<W>::FactorAndSolve(int n,
                                    double* panel,
                                    int panel_stride,
                                    int columns) {
-  constexpr int kLargest = 16;
+  constexpr int kLargest = 24;
   double masses[kLargest];
   for (int j = 0; j < n; ++j) masses[j] = matrix[j * stride + j];
   for (int j = 0; j < n; ++j) {

@@ -77,7 +77,7 @@ struct DenseLanes {
                                   int count,
                                   const LandmarkTarget* targets);
 
-  // Factors a symmetric matrix of n rows (n <= 16, `stride` apart, whole
+  // Factors a symmetric matrix of n rows (n <= 24, `stride` apart, whole
   // vectors) as U^T U, with U overwriting its upper triangle, with the
   // safeguard of small_cholesky.h, and overwrites the columns x of a panel of n
   // rows by U^-T x.

@@ -15,11 +15,13 @@ void StateElimination::Start(const ChainLayout& layout,
   panel_stride_ =
       layout.fixed + WholeVectors(structure.max_slots() * kPose) + kZeros;
   for (auto* panel : {&coupling_, &substituted_, &product_, &half_}) {
-    GrowTo(static_cast<std::size_t>(kTileState) * panel_stride_, panel);
+    GrowTo(static_cast<std::size_t>(tile()) * panel_stride_, panel);
   }
   GrowTo(static_cast<std::size_t>(layout.fixed + kPose + kPanelPad) *
-             TransitionColumns(layout.link_size).pose_end,
+             layout.columns().pose_end,
          &link_terms_);
+  information_.setZero();
+  root_ = {};
 }
 
 void StateElimination::TakeMemory(StateElimination* finished) {
@@ -39,18 +41,19 @@ EliminatedState StateElimination::ByLink(const ChainTransition& link,
   FindRootOf(link);
   const EliminatedState result = Eliminate(substituted_, front);
   AddPosesWithFixed(link, front);
+  AddRows(link, front);
   return result;
 }
 
 EliminatedState StateElimination::ByItself(ChainFront* front) {
   TakeState(front);
-  alignas(64) double M[kState][16] = {};
-  alignas(64) double panel[kState][16] = {};
-  for (int i = 0; i < kState; ++i) {
-    for (int j = 0; j < kState; ++j) M[i][j] = information_(i, j);
+  alignas(64) StateRoot::Rows M = {};
+  alignas(64) StateRoot::Rows panel = {};
+  for (int i = 0; i < state(); ++i) {
+    for (int j = 0; j < state(); ++j) M[i][j] = information_(i, j);
     panel[i][i] = 1;
   }
-  FindRoot(M, panel);
+  FindRoot(&M, &panel);
   return Eliminate(coupling_, front);
 }
 
@@ -62,29 +65,31 @@ void StateElimination::TakeState(ChainFront* all) {
   const int fixed = layout_.fixed, motion = layout_.motion_place();
   const int pose = front.Pose(0);
   const int rest = front.PosesSize() - kPose;
-  auto S = information_.topLeftCorner<kState, kState>();
+  const int motion_size = layout_.motion_size;
+  auto S = information_.topLeftCorner(state(), state());
   for (int i = 0; i < kPose; ++i) {
     double* y = Row(&coupling_, i);
     for (int j = 0; j < fixed; ++j) y[j] = front(pose + i, j);
-    for (int j = 0; j < kMotion; ++j) S(kPose + j, i) = y[motion + j];
+    for (int j = 0; j < motion_size; ++j) S(kPose + j, i) = y[motion + j];
     for (int j = i; j < kPose; ++j) S(j, i) = front(pose + j, pose + i);
     std::copy_n(&front(pose + kPose, pose + i), rest, y + fixed);
   }
-  for (int m = 0; m < kMotion; ++m) {
+  for (int m = 0; m < motion_size; ++m) {
     const int at = motion + m;
     double* y = Row(&coupling_, kPose + m);
     for (int j = 0; j < at; ++j) y[j] = front(at, j);
     for (int j = at; j < fixed; ++j) y[j] = front(j, at);
-    for (int j = m; j < kMotion; ++j) S(kPose + j, kPose + m) = y[motion + j];
+    for (int j = m; j < motion_size; ++j)
+      S(kPose + j, kPose + m) = y[motion + j];
     std::copy_n(&front(pose + kPose, at), rest, y + fixed);
     for (int j = 0; j < at; ++j) front(at, j) = 0;
     Zero(&front(at, at), fixed - at);
     Zero(&front(pose, at), rest + kPose);
   }
   S.triangularView<Eigen::StrictlyUpper>() = S.transpose();
-  for (int k = 0; k < kState; ++k) {
+  for (int k = 0; k < state(); ++k) {
     double* y = Row(&coupling_, k);
-    Zero(y + motion, kMotion);
+    Zero(y + motion, motion_size);
     Zero(y + fixed + rest, kZeros);
   }
   front.CloseSlot();
@@ -95,11 +100,11 @@ void StateElimination::TakeState(ChainFront* all) {
 // G^T S G + G^T Y + Y^T G = G^T H + H^T G with H = Y + S G / 2.
 void StateElimination::Substitute(const ChainTransition& link,
                                   ChainFront* front) {
-  alignas(64) double by_S[kTileState * kMaxTransitionColumns];
+  alignas(64) double by_S[kMaxTileState * kMaxTransitionColumns];
   const TransitionColumns& at = link.columns;
   const int fixed = layout_.fixed;
   const int size = fixed + front->PosesSize();
-  for (int k = 0; k < kState; ++k) {
+  for (int k = 0; k < state(); ++k) {
     std::copy_n(Row(&coupling_, k), size + kZeros, Row(&substituted_, k));
     std::copy_n(Row(&coupling_, k), fixed + kPose, Row(&half_, k));
     Zero(Row(&half_, k) + fixed + kPose, kPanelPad);
@@ -107,9 +112,9 @@ void StateElimination::Substitute(const ChainTransition& link,
   WithKernels(width_, [&](auto kernels) {
     kernels.SetProduct({link.G, at.stride},
                        at.pose_end,
-                       {information_.data(), kTileState},
-                       kTileState,
-                       kState,
+                       {information_.data(), kMaxTileState},
+                       tile(),
+                       state(),
                        {by_S, at.stride});
   });
   const auto add = [&](double factor, const double* terms, double* to) {
@@ -119,7 +124,7 @@ void StateElimination::Substitute(const ChainTransition& link,
       to[fixed + c] += factor * terms[at.next_pose + c];
     }
   };
-  for (int k = 0; k < kState; ++k) {
+  for (int k = 0; k < state(); ++k) {
     const double* terms = by_S + k * at.stride;
     add(1, terms, Row(&substituted_, k));
     add(0.5, terms, Row(&half_, k));
@@ -136,7 +141,7 @@ void StateElimination::Substitute(const ChainTransition& link,
                        rest,
                        {link.G + at.next_pose, at.stride},
                        kPose,
-                       kState,
+                       state(),
                        front->At(pose + kPose, pose));
   });
 }
@@ -153,7 +158,7 @@ void StateElimination::AddHalf(const ChainTransition& link, ChainFront* all) {
                        size_f,
                        {link.G, columns.stride},
                        columns.pose_end,
-                       kState,
+                       state(),
                        {link_terms_.data(), stride});
   });
   const int pose = front.Pose(0);
@@ -171,41 +176,47 @@ void StateElimination::AddHalf(const ChainTransition& link, ChainFront* all) {
 }
 
 // root = A L^-T with L L^T = M, row-major; A is the transpose of `panel`.
-void StateElimination::FindRoot(double (*M)[16], double (*panel)[16]) {
+void StateElimination::FindRoot(StateRoot::Rows* M, StateRoot::Rows* panel) {
   WithKernels(width_, [&](auto kernels) {
-    kernels.FactorAndSolve(kState, &M[0][0], 16, &panel[0][0], 16, kState);
+    kernels.FactorAndSolve(state(),
+                           &(*M)[0][0],
+                           kMaxTileState,
+                           &(*panel)[0][0],
+                           kMaxTileState,
+                           state());
   });
-  for (int i = 0; i < kState; ++i) {
-    for (int j = 0; j < kState; ++j) {
-      root_.root[i][j] = panel[j][i];
-      root_.transposed[i][j] = panel[i][j];
-      root_.factor[i][j] = M[i][j];
+  for (int i = 0; i < state(); ++i) {
+    for (int j = 0; j < state(); ++j) {
+      root_.root[i][j] = (*panel)[j][i];
+      root_.transposed[i][j] = (*panel)[i][j];
+      root_.factor[i][j] = (*M)[i][j];
     }
   }
 }
 
 // M = I + A^T S A.
 void StateElimination::FindRootOf(const ChainTransition& link) {
-  alignas(64) double by_S[kTileState][16];
-  alignas(64) double M[kTileState][16];
-  alignas(64) double panel[kState][16];
-  const ConstPanel A = {link.A, kTransitionNoise};
+  alignas(64) StateRoot::Rows by_S;
+  alignas(64) StateRoot::Rows M;
+  alignas(64) StateRoot::Rows panel;
+  const int noise = link.noise();
+  const ConstPanel A = {link.A, noise};
+  const ConstPanel terms = {&by_S[0][0], kMaxTileState};
   WithKernels(width_, [&](auto kernels) {
     kernels.SetProduct(A,
-                       kState,
-                       {information_.data(), kTileState},
-                       kTileState,
-                       kState,
-                       {&by_S[0][0], 16});
+                       state(),
+                       {information_.data(), kMaxTileState},
+                       tile(),
+                       state(),
+                       {&by_S[0][0], kMaxTileState});
     kernels.SetProduct(
-        {&by_S[0][0], 16}, kState, A, kTileState, kState, {&M[0][0], 16});
+        terms, state(), A, tile(), state(), {&M[0][0], kMaxTileState});
   });
-  for (int i = 0; i < kState; ++i) {
+  for (int i = 0; i < state(); ++i) {
     M[i][i] += 1;
-    for (int j = 0; j < kState; ++j)
-      panel[i][j] = link.A[j * kTransitionNoise + i];
+    for (int j = 0; j < state(); ++j) panel[i][j] = link.A[j * noise + i];
   }
-  FindRoot(M, panel);
+  FindRoot(&M, &panel);
 }
 
 // Computes P = root^T Z, and subtracts P^T P from the front, except for the
@@ -218,16 +229,16 @@ EliminatedState StateElimination::Eliminate(const std::vector<double>& terms,
   const int pose = front->Pose(0);
   const ConstPanel by_fixed = {product_.data(), panel_stride_};
   const ConstPanel by_pose = {product_.data() + fixed, panel_stride_};
-  for (int k = 0; k < kState; ++k) Zero(Row(&product_, k) + size, kZeros);
+  for (int k = 0; k < state(); ++k) Zero(Row(&product_, k) + size, kZeros);
   WithKernels(width_, [&](auto kernels) {
     kernels.SetProduct({terms.data(), panel_stride_},
                        size,
-                       {&root_.root[0][0], 16},
-                       kTileState,
-                       kState,
+                       {&root_.root[0][0], kMaxTileState},
+                       tile(),
+                       state(),
                        {product_.data(), panel_stride_});
-    kernels.AddSquare(-1, by_fixed, fixed, kState, front->At(0, 0));
-    kernels.AddSquare(-1, by_pose, poses, kState, front->At(pose, pose));
+    kernels.AddSquare(-1, by_fixed, fixed, state(), front->At(0, 0));
+    kernels.AddSquare(-1, by_pose, poses, state(), front->At(pose, pose));
   });
   return {root_, by_fixed, size};
 }
@@ -239,8 +250,8 @@ void StateElimination::AddPosesWithFixed(const ChainTransition& link,
                                          ChainFront* front) {
   const int fixed = layout_.fixed;
   const int rest = front->PosesSize() - kPose;
-  alignas(64) double next[kState][16] = {};
-  for (int k = 0; k < kState; ++k) {
+  alignas(64) double next[kMaxChainStateSize][kPanelPad] = {};
+  for (int k = 0; k < state(); ++k) {
     std::copy_n(Row(&product_, k) + fixed, kPose, next[k]);
     Zero(Row(&half_, k), fixed);
     const double* G = link.G + k * link.columns.stride;
@@ -251,28 +262,52 @@ void StateElimination::AddPosesWithFixed(const ChainTransition& link,
   const int pose = front->Pose(0);
   WithKernels(width_, [&](auto kernels) {
     kernels.AddProduct(-1,
-                       {&next[0][0], 16},
+                       {&next[0][0], kPanelPad},
                        kPose,
                        by_fixed,
                        layout_.constant + 1,
-                       kState,
+                       state(),
                        front->At(pose, 0));
     if (rest == 0) return;
     kernels.AddProduct(-1,
                        by_fixed,
                        fixed,
-                       {&root_.transposed[0][0], 16},
-                       kTileState,
-                       kState,
+                       {&root_.transposed[0][0], kMaxTileState},
+                       tile(),
+                       state(),
                        {half_.data(), panel_stride_});
     kernels.AddProduct(1,
                        {coupling_.data() + fixed + kPose, panel_stride_},
                        rest,
                        {half_.data(), panel_stride_},
                        layout_.constant + 1,
-                       kState,
+                       state(),
                        front->At(pose + kPose, 0));
   });
+}
+
+// Adds the further rows of a link, which are over the link parameters, the next
+// state and the constant: these are in the front by now.
+void StateElimination::AddRows(const ChainTransition& link,
+                               ChainFront* front) const {
+  const TransitionColumns& columns = link.columns;
+  const int pose = front->Pose(0);
+  const auto place = [&](int column) {
+    if (column < columns.constant) return column;
+    return column == columns.constant ? layout_.constant
+                                      : pose + column - columns.next_pose;
+  };
+  for (int row = 0; row < link.rows; ++row) {
+    const double* h = link.H + row * columns.stride;
+    for (int i = 0; i < columns.pose_end; ++i) {
+      if (i >= columns.motion_end && i < columns.constant) continue;
+      for (int j = 0; j <= i; ++j) {
+        if (j >= columns.motion_end && j < columns.constant) continue;
+        const int a = place(i), b = place(j);
+        (*front)(std::max(a, b), std::min(a, b)) += h[i] * h[j];
+      }
+    }
+  }
 }
 
 }  // namespace selfcal

@@ -18,15 +18,16 @@ namespace selfcal {
 // A L^-T with L L^T = I + A^T S A for a link, S the information of the state;
 // L^-T with L L^T = S without.
 struct StateRoot {
-  alignas(64) double root[chain::kState][16] = {};
-  alignas(64) double transposed[chain::kState][16] = {};
-  double factor[chain::kState][16] = {};  // L^T, the upper triangle
+  using Rows = double[chain::kMaxTileState][chain::kMaxTileState];
+  alignas(64) Rows root = {};
+  alignas(64) Rows transposed = {};
+  Rows factor = {};  // L^T, the upper triangle
 };
 
 // A state that was eliminated, in terms of the front that remains.
 struct EliminatedState {
   const StateRoot& root;
-  ConstPanel product;  // P = root^T Z, 15 rows over the front
+  ConstPanel product;  // P = root^T Z, rows of the state over the front
   int size;            // of the front
 };
 
@@ -48,11 +49,15 @@ class StateElimination {
   void TakeState(ChainFront* front);
   void Substitute(const ChainTransition& link, ChainFront* front);
   void AddHalf(const ChainTransition& link, ChainFront* front);
-  void FindRoot(double (*M)[16], double (*panel)[16]);
+  void FindRoot(StateRoot::Rows* M, StateRoot::Rows* panel);
   void FindRootOf(const ChainTransition& link);
   EliminatedState Eliminate(const std::vector<double>& terms,
                             ChainFront* front);
   void AddPosesWithFixed(const ChainTransition& link, ChainFront* front);
+  void AddRows(const ChainTransition& link, ChainFront* front) const;
+
+  int state() const { return layout_.state_size(); }
+  int tile() const { return WholeVectors(state()); }
 
   double* Row(std::vector<double>* panel, int k) const {
     return panel->data() + k * panel_stride_;
@@ -60,11 +65,12 @@ class StateElimination {
 
   VectorWidth width_;
   ChainLayout layout_;
-  // The information S of the state; panels of 15 rows over the front: coupling
-  // Y, Z = Y + S G, P = root^T Z; and Y + S G / 2. One additional zero makes
-  // tiles whole.
-  Eigen::Matrix<double, 16, 16> information_ =
-      Eigen::Matrix<double, 16, 16>::Zero();
+  // The information S of the state, in whole tiles; panels of the rows of the
+  // state over the front: coupling Y, Z = Y + S G, P = root^T Z; and Y + S G
+  // / 2.
+  using Tiles =
+      Eigen::Matrix<double, chain::kMaxTileState, chain::kMaxTileState>;
+  Tiles information_ = Tiles::Zero();
   StateRoot root_;
   int panel_stride_ = 0;
   std::vector<double> coupling_, substituted_, product_, half_, link_terms_;

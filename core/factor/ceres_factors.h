@@ -7,7 +7,7 @@
 //              can be held constant (SubspaceManifold);
 //   q      [4] q_GI as Eigen stores it (x, y, z, w), with RotationManifold;
 //   p      [3] p_GI [m];
-//   vb     [9] (v_GI 3, b_a 3, b_g 3);
+//   vb     [9] (v_GI 3, b_a 3, b_g 3), or those of the second IMU;
 //   l      [3] landmark, either p_G [m], or (alpha, beta, rho) anchored at a
 //              fixed place: p_G = a + R_GA (alpha, beta, 1) / rho.
 // The caller owns the returned object; data that a factory takes by span or
@@ -39,11 +39,13 @@ std::unique_ptr<ceres::CostFunction> MakeReprojectionCost(
     const std::optional<LandmarkAnchor>& anchor,
     const KeyframeMotion* motion = nullptr);
 
-// Blocks (theta, q0, p0, vb0, q1, p1, vb1); 15 residuals, whitened by the given
-// square root information, which is constant during the lifetime of the factor:
-// the noise does not depend on the estimate.
+// Blocks (theta, q0, p0, vb0, q1, p1, vb1); 15 residuals of an IMU
+// (second_imu.h), whitened by the given square root information, which is
+// constant during the lifetime of the factor: the noise does not depend on the
+// estimate.
 std::unique_ptr<ceres::CostFunction> MakeInertialCost(
     const Calibration& theta_reference,
+    int imu,
     std::span<const ImuSample> samples,
     std::int64_t t0_ns,
     std::int64_t t1_ns,

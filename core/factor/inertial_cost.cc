@@ -1,6 +1,7 @@
 #include "core/factor/ceres_factors.h"
 #include "core/factor/quaternion_block.h"
 #include "core/factor/theta_block.h"
+#include "core/model/second_imu.h"
 
 namespace selfcal {
 namespace {
@@ -13,14 +14,18 @@ using RowMajor15 = Eigen::Matrix<double, 15, cols, Eigen::RowMajor>;
 // The blocks of a state are consecutive: q, p, vb.
 enum Block { kTheta, kState0, kState1 = kState0 + 3 };
 
-KeyframeState ReadState(std::int64_t t_ns, double const* const* blocks) {
-  const double* vb = blocks[2];
-  return {.t_ns = t_ns,
-          .q_GI = ReadQuaternion(blocks[0]),
-          .p_GI = Map<const Vector3d>(blocks[1]),
-          .v_GI = Map<const Vector3d>(vb),
-          .b_a = Map<const Vector3d>(vb + 3),
-          .b_g = Map<const Vector3d>(vb + 6)};
+// A keyframe, with the motion of one IMU.
+KeyframeState ReadState(std::int64_t t_ns,
+                        int imu,
+                        double const* const* blocks) {
+  KeyframeState x = {.t_ns = t_ns,
+                     .q_GI = ReadQuaternion(blocks[0]),
+                     .p_GI = Map<const Vector3d>(blocks[1])};
+  const Map<const Eigen::Matrix3d> vb(blocks[2]);
+  (imu == 0 ? x.v_GI : x.v_GJ) = vb.col(0);
+  (imu == 0 ? x.b_a : x.b_a1) = vb.col(1);
+  (imu == 0 ? x.b_g : x.b_g1) = vb.col(2);
+  return x;
 }
 
 // `J` is whitened, with respect to a state.
@@ -44,13 +49,17 @@ void WriteStateJacobians(const InertialMatrix& J,
 class InertialCost final : public ceres::CostFunction {
  public:
   InertialCost(const Calibration& theta_reference,
+               int imu,
                std::span<const ImuSample> samples,
                std::int64_t t0_ns,
                std::int64_t t1_ns,
                const ImuNoise& noise,
                double gravity_mps2,
                const InertialMatrix& square_root_information)
-      : imu_reference_(theta_reference.imu),
+      : reference_({.imu = theta_reference.imu,
+                    .imu1 = theta_reference.imu1,
+                    .cameras = {}}),
+        imu_(imu),
         theta_size_(TangentSize(theta_reference)),
         samples_(samples),
         t0_ns_(t0_ns),
@@ -65,25 +74,32 @@ class InertialCost final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters,
                 double* residuals,
                 double** jacobians) const override {
-    const KeyframeState x0 = ReadState(t0_ns_, parameters + kState0);
-    const KeyframeState x1 = ReadState(t1_ns_, parameters + kState1);
+    const KeyframeState x0 = ReadState(t0_ns_, imu_, parameters + kState0);
+    const KeyframeState x1 = ReadState(t1_ns_, imu_, parameters + kState1);
+    const Calibration theta = OffsetImus(reference_, parameters[kTheta]);
     InertialJacobians J;
     Map<InertialResidual> r(residuals);
     r = W_ * EvaluateInertial(samples_,
-                              x0,
-                              x1,
-                              OffsetImu(imu_reference_, parameters[kTheta]),
+                              StateOfImu(theta, imu_, x0),
+                              StateOfImu(theta, imu_, x1),
+                              ImuOf(theta, imu_),
                               noise_,
                               gravity_mps2_,
                               jacobians == nullptr ? nullptr : &J,
                               nullptr);
     if (jacobians == nullptr) return true;
+    const double* d = parameters[kTheta];
+    Eigen::MatrixXd by_imus =
+        Eigen::MatrixXd::Zero(15, LinkTangentSize(reference_));
+    const int first = imu_ == 0 ? 0 : ImuTangentSize(reference_.imu);
+    by_imus.middleCols(first, J.theta.cols()) = J.theta;
+    ByRotationOffset(d + first + kAccelRotation,
+                     by_imus.middleCols<3>(first + kAccelRotation));
+    if (imu_ == 1) ByKeyframes(*theta.imu1, x0, x1, d, &J, &by_imus);
     if (double* out = jacobians[kTheta]) {
-      ByRotationOffset(parameters[kTheta] + kAccelRotation,
-                       J.theta.middleCols<3>(kAccelRotation));
       Map<RowMajor15<Eigen::Dynamic>> by_theta(out, 15, theta_size_);
       by_theta.setZero();
-      by_theta.leftCols(J.theta.cols()) = W_ * J.theta;
+      by_theta.leftCols(by_imus.cols()) = W_ * by_imus;
     }
     WriteStateJacobians(W_ * J.x0, x0.q_GI, jacobians + kState0);
     WriteStateJacobians(W_ * J.x1, x1.q_GI, jacobians + kState1);
@@ -91,7 +107,29 @@ class InertialCost final : public ceres::CostFunction {
   }
 
  private:
-  const ImuCalibration imu_reference_;
+  // Turns derivatives by the states of the second IMU to those by the
+  // keyframes, and by its mount, the last columns of by_imus.
+  static void ByKeyframes(const SecondImuCalibration& imu,
+                          const KeyframeState& x0,
+                          const KeyframeState& x1,
+                          const double* d,
+                          InertialJacobians* J,
+                          Eigen::MatrixXd* by_imus) {
+    auto by_mount = by_imus->rightCols<kMountTangentSize>();
+    const auto carry = [&](const KeyframeState& x, InertialMatrix* by_state) {
+      const MountDerivatives at = DerivativesOfMount(imu, x);
+      const Eigen::Matrix<double, 15, 6> by_pose = by_state->leftCols<6>();
+      by_mount += by_pose * at.by_mount;
+      by_state->leftCols<6>() = by_pose * at.by_pose;
+    };
+    carry(x0, &J->x0);
+    carry(x1, &J->x1);
+    ByRotationOffset(d + by_imus->cols() - kMountTangentSize,
+                     by_mount.leftCols<3>());
+  }
+
+  const Calibration reference_;  // without cameras
+  const int imu_;
   const int theta_size_;
   const std::span<const ImuSample> samples_;
   const std::int64_t t0_ns_, t1_ns_;
@@ -104,6 +142,7 @@ class InertialCost final : public ceres::CostFunction {
 
 std::unique_ptr<ceres::CostFunction> MakeInertialCost(
     const Calibration& theta_reference,
+    int imu,
     std::span<const ImuSample> samples,
     std::int64_t t0_ns,
     std::int64_t t1_ns,
@@ -111,6 +150,7 @@ std::unique_ptr<ceres::CostFunction> MakeInertialCost(
     double gravity_mps2,
     const InertialMatrix& square_root_information) {
   return std::make_unique<InertialCost>(theta_reference,
+                                        imu,
                                         samples,
                                         t0_ns,
                                         t1_ns,

@@ -118,7 +118,7 @@ Eigen::Matrix<T, 15, 1> Whiten(const NoiseRoot<T>& root,
 // TransitionColumns::stride numbers.
 template <typename T>
 struct MotionRows {
-  T G[9 * kMaxTransitionColumns];
+  T G[9 * TransitionColumns(kMaxImuTangentSize).stride];
   T A[9][kTransitionNoise];
 };
 

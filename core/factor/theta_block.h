@@ -18,11 +18,12 @@ void ByRotationOffset(const double* d, Columns&& columns) {
       (columns * RightJacobian(Eigen::Map<const Eigen::Vector3d>(d))).eval();
 }
 
-// The IMU part of the reference, at the offset at the beginning of the block.
-inline ImuCalibration OffsetImu(const ImuCalibration& reference,
-                                const double* theta) {
-  const Eigen::Map<const Eigen::VectorXd> d(theta, ImuTangentSize(reference));
-  return BoxPlus(Calibration{.imu = reference, .cameras = {}}, d).imu;
+// The IMUs of a reference without cameras, at the offset at the beginning of
+// the block.
+inline Calibration OffsetImus(const Calibration& reference,
+                              const double* theta) {
+  const Eigen::Map<const Eigen::VectorXd> d(theta, LinkTangentSize(reference));
+  return BoxPlus(reference, d);
 }
 
 // One camera of the reference, at the offset of its part of the block.

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/information/weak_priors.h"
+#include "core/model/second_imu.h"
 
 namespace selfcal {
 namespace {
@@ -29,7 +30,7 @@ constexpr double kEndTieAccelBias_mps2 = 1e-5;
 constexpr double kEndTieGyroBias_radps = 1e-7;
 
 ChainStateVector EndTies() {
-  ChainStateVector information;
+  ChainStateVector information(kChainStateSize);
   const auto set = [&](int at, double sigma) {
     information.segment<3>(at).setConstant(Information(sigma));
   };
@@ -43,20 +44,23 @@ ChainStateVector EndTies() {
 
 }  // namespace
 
-ChainStateMatrix MotionPrior() {
-  ChainStateVector prior = ChainStateVector::Zero();
-  prior.segment<3>(kStateVelocity)
-      .setConstant(Information(kVelocityPriorSigma_mps));
-  prior.segment<3>(kStateAccelBias)
-      .setConstant(Information(kAccelBiasPriorSigma_mps2));
-  prior.segment<3>(kStateGyroBias)
-      .setConstant(Information(kGyroBiasPriorSigma_radps));
+ChainStateMatrix MotionPrior(int size) {
+  ChainStateVector prior = ChainStateVector::Zero(size);
+  for (int motion = 0; motion + kStateTangentSize <= size;
+       motion += kMotionTangentSize) {
+    prior.segment<3>(motion + kStateVelocity)
+        .setConstant(Information(kVelocityPriorSigma_mps));
+    prior.segment<3>(motion + kStateAccelBias)
+        .setConstant(Information(kAccelBiasPriorSigma_mps2));
+    prior.segment<3>(motion + kStateGyroBias)
+        .setConstant(Information(kGyroBiasPriorSigma_radps));
+  }
   return prior.asDiagonal();
 }
 
 // Holds position and rotation about gravity; constrains the tilt weakly.
-ChainStateMatrix GaugePrior(const KeyframeState& x) {
-  ChainStateMatrix prior = ChainStateMatrix::Zero();
+ChainStateMatrix GaugePrior(const KeyframeState& x, int size) {
+  ChainStateMatrix prior = ChainStateMatrix::Zero(size, size);
   const Eigen::Matrix3d R_IG = x.q_GI.toRotationMatrix().transpose();
   const double tilt = Information(kTiltPriorSigma_rad);
   const Eigen::Vector3d rotation_G(tilt, tilt, Information(kGaugeSigma_rad));
@@ -121,30 +125,29 @@ void SegmentLineariser::LineariseViews(const Rig& rig,
 void SegmentLineariser::LineariseLinks(const Rig& rig,
                                        const Calibration& theta0,
                                        const MotionSegment& segment) {
-  links_.clear();
-  const std::span<const ImuSample> samples = SamplesFromFirstKeyframe(segment);
-  for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
-    links_.push_back(
-        {&segment.keyframes[k], &segment.keyframes[k + 1], samples});
+  const std::span<const ImuSample> samples[kMaxImus] = {
+      SamplesFromFirstKeyframe(segment),
+      SecondSamplesFromFirstKeyframe(segment)};
+  for (int imu = 0; imu < ImuCount(theta0); ++imu) {
+    links_[imu].clear();
+    for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
+      links_[imu].push_back(
+          {&segment.keyframes[k], &segment.keyframes[k + 1], samples[imu]});
+    }
   }
-  roots_.resize(std::max(roots_.size(), links_.size()));
-  inertial_.Linearise(links_,
-                      theta0.imu,
-                      rig.imu_noise,
-                      rig.gravity_mps2,
-                      std::span(roots_).first(links_.size()),
-                      &transitions_);
+  inertial_.Linearise(links_, theta0, rig, &transitions_);
+  const std::size_t links = transitions_.size();
   double squares[kKinds] = {};
-  for (std::size_t i = 0; i < links_.size(); ++i) {
+  for (std::size_t i = 0; i < links; ++i) {
     for (int j = 0; j < kStateTangentSize; ++j) {
-      const double r = transitions_[i].whitened[j];
+      const double r = transitions_.Whitened(i, 0)[j];
       squares[j / 3] += r * r;
     }
   }
   result_.inertial_rms.clear();
   for (const double sum : squares) {
     result_.inertial_rms.push_back(
-        std::sqrt(sum / (3.0 * static_cast<double>(links_.size()))));
+        std::sqrt(sum / (3.0 * static_cast<double>(links))));
   }
 }
 
@@ -171,12 +174,14 @@ void SegmentLineariser::StartChain(const Rig& rig,
     cameras_.push_back(RowsOf(camera));
   }
   FindTracks(segment, selection, order);
-  elimination_.Start({.keyframes = static_cast<int>(segment.keyframes.size()),
-                      .link_size = ImuTangentSize(theta0.imu),
-                      .cameras = cameras_,
-                      .tracks = tracks_,
-                      .track_keyframes = track_keyframes_,
-                      .kept = kept});
+  elimination_.Start(
+      {.keyframes = static_cast<int>(segment.keyframes.size()),
+       .link_size = LinkTangentSize(theta0),
+       .cameras = cameras_,
+       .tracks = tracks_,
+       .track_keyframes = track_keyframes_,
+       .kept = kept,
+       .motion_size = StateTangentSize(theta0) - kChainPoseSize});
   LineariseViews(rig,
                  theta0,
                  segment,
@@ -213,9 +218,10 @@ const LinearisedSegment& SegmentLineariser::Eliminate(
   LineariseLinks(rig, theta0, segment);
   const int keyframes = static_cast<int>(segment.keyframes.size());
   for (int k = 0; k < keyframes; ++k) {
-    if (k == 0) elimination_.AddPrior(MotionPrior());
+    const int size = StateTangentSize(theta0);
+    if (k == 0) elimination_.AddPrior(MotionPrior(size));
     if (k == gauge_keyframe) {
-      elimination_.AddPrior(GaugePrior(segment.keyframes[k]));
+      elimination_.AddPrior(GaugePrior(segment.keyframes[k], size));
     }
     if (k + 1 < keyframes) elimination_.Advance(transitions_[k]);
   }
@@ -234,6 +240,12 @@ const LinearisedSegment& SegmentLineariser::EliminateToEnds(
       rig, theta0, segment, motions, selection, order, 2 * kChainStateSize);
   LineariseLinks(rig, theta0, segment);
   const int keyframes = static_cast<int>(segment.keyframes.size());
+  if (theta0.imu1) {
+    // Only the motion of the second IMU has a prior: no end ties it.
+    ChainStateMatrix prior = MotionPrior(kMaxChainStateSize);
+    prior.topLeftCorner<kChainStateSize, kChainStateSize>().setZero();
+    elimination_.AddPrior(prior);
+  }
   elimination_.AddKeptState(0, EndTies());
   for (int k = 0; k + 1 < keyframes; ++k) elimination_.Advance(transitions_[k]);
   elimination_.AddKeptState(kChainStateSize, EndTies());

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/elimination/chain_elimination.h"
-#include "core/factor/inertial_batch.h"
 #include "core/factor/keyframe_motion.h"
+#include "core/factor/link_batch.h"
 #include "core/factor/reprojection_batch.h"
 #include "core/information/inliers.h"
 #include "core/information/observation_order.h"
@@ -17,16 +17,17 @@
 
 namespace selfcal {
 
-// Information about the states of the first keyframe of a chain, with the
-// sigmas of weak_priors.h: about its velocity and biases, and about the gauge,
-// which is unobservable and held constant.
-ChainStateMatrix MotionPrior();
-ChainStateMatrix GaugePrior(const KeyframeState& x);
+// Information about the states of the first keyframe of a chain, of 15 unknowns
+// or with a second IMU of 24, with the sigmas of weak_priors.h: about its
+// velocities and biases, and about the gauge, which is unobservable and held
+// constant.
+ChainStateMatrix MotionPrior(int size = kChainStateSize);
+ChainStateMatrix GaugePrior(const KeyframeState& x, int size = kChainStateSize);
 
 struct LinearisedSegment {
   SharedInformation theta;  // over the whole tangent, in its units
-  // Root mean square of the whitened inertial residuals, by kind (rotation,
-  // velocity, position, b_a, b_g).
+  // Root mean square of the whitened inertial residuals of the first IMU, by
+  // kind (rotation, velocity, position, b_a, b_g).
   std::vector<double> inertial_rms;
 };
 
@@ -52,7 +53,8 @@ class SegmentLineariser {
 
   // Eliminates without priors on states, down to theta and the states of the
   // first and the last keyframe, in this order: information about D + 30
-  // unknowns. The position of both keyframes together and their rotation about
+  // unknowns. The motion of a second IMU is eliminated at the ends as well. The
+  // position of both keyframes together and their rotation about
   // gravity are free.
   const LinearisedSegment& EliminateToEnds(const Rig& rig,
                                            const Calibration& theta0,
@@ -93,7 +95,7 @@ class SegmentLineariser {
                   int kept);
 
   ReprojectionBatch reprojection_;
-  InertialBatch inertial_;
+  LinkBatch inertial_;
   ChainElimination elimination_;
   LinearisedSegment result_;
 
@@ -105,9 +107,8 @@ class SegmentLineariser {
   std::vector<int> factor_of_observation_;  // -1 for an outlier
   std::vector<int> factors_;                // by view
   std::vector<double> rows_;                // of one run
-  std::vector<InertialLinkStates> links_;
-  std::vector<InertialNoiseRoot> roots_;
-  InertialTransitions transitions_;
+  LinksOfImus links_;
+  LinkTransitions transitions_;
 };
 
 }  // namespace selfcal

@@ -6,6 +6,7 @@
 #include "core/information/inliers.h"
 #include "core/information/linearisation.h"
 #include "core/information/observation_order.h"
+#include "core/model/second_imu.h"
 #include "core/model/temperature.h"
 
 namespace selfcal {
@@ -31,9 +32,11 @@ std::vector<ImuSample> Tail(const MotionSegment& segment) {
 
 SegmentEnds SummariseEnds(const Rig& rig,
                           const Calibration& theta0,
-                          const MotionSegment& segment,
+                          const MotionSegment& given,
                           const ScoreOptions& options) {
-  const SegmentTheta theta_s(theta0, segment);
+  const SegmentTheta theta_s(theta0, given);
+  const StartedSegment started(*theta_s, given);
+  const MotionSegment& segment = *started;
   ObservationOrder order;
   order.Find(segment, static_cast<int>(theta0.cameras.size()));
   const KeyframeMotions motions = SegmentMotions(rig, *theta_s, segment);

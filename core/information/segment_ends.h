@@ -7,7 +7,8 @@
 // sigmas of 1.05 to 1.6 times those of a calibration on all data. With both
 // ends, neighbours can be joined later as if they were one segment
 // (session_chain.h); this neglects only that landmarks continue from one to the
-// next, which is worth 4 to 10 %.
+// next, which is worth 4 to 10 %. The motion of a second IMU is not part of an
+// end: neighbours are joined by the readings of the first one alone.
 //
 // Pure functions, callable from any thread, deterministic for one width of
 // vectors.

@@ -7,6 +7,7 @@
 #include "core/elimination/by_theta.h"
 #include "core/factor/sampling.h"
 #include "core/information/offset_start.h"
+#include "core/model/second_imu.h"
 #include "core/model/symmetric_eigen.h"
 #include "core/model/temperature.h"
 
@@ -23,13 +24,15 @@ double PixelSquares(const ResidualStatistics& residuals,
 
 // Rows minus unknowns: pixels and inertial links minus landmarks, states
 // without the gauge, and observed directions of theta.
-double Redundancy(const MotionSegment& segment,
+double Redundancy(const Calibration& theta,
+                  const MotionSegment& segment,
                   const ResidualStatistics& residuals,
                   int rank) {
   constexpr int kGauge = 4;
   const auto keyframes = static_cast<double>(segment.keyframes.size());
-  return 2.0 * residuals.inliers + kStateTangentSize * (keyframes - 1) -
-         3.0 * residuals.landmarks_used - kStateTangentSize * keyframes +
+  return 2.0 * residuals.inliers +
+         ImuCount(theta) * kStateTangentSize * (keyframes - 1) -
+         3.0 * residuals.landmarks_used - StateTangentSize(theta) * keyframes +
          kGauge - rank;
 }
 
@@ -67,7 +70,7 @@ double SegmentScorer::MeasureFit(const Rig& rig,
     squares -= definite_.InverseSquare(gradient_);
   }
   const double redundancy =
-      Redundancy(segment, result->residuals, result->rank);
+      Redundancy(rig.factory, segment, result->residuals, result->rank);
   if (!(redundancy >= kLeastFitRedundancy)) {
     result->residuals.fit = 0;
     return 1;
@@ -108,10 +111,12 @@ void SegmentScorer::Score(const Rig& rig,
 
 void SegmentScorer::ScoreAt(const Rig& rig,
                             const Calibration& theta0,
-                            const MotionSegment& segment,
+                            const MotionSegment& given,
                             const ScoreOptions& options,
                             SegmentInformation* result) {
-  const SegmentTheta theta_s(theta0, segment);
+  const SegmentTheta theta_s(theta0, given);
+  const StartedSegment started(*theta_s, given);
+  const MotionSegment& segment = *started;
   order_.Find(segment, static_cast<int>(theta0.cameras.size()));
   motions_.Measure(rig,
                    *theta_s,

@@ -108,12 +108,18 @@ int ImuTangentSize(const ImuCalibration& imu) {
   return SensorTangentSize(kImuBlocks, imu);
 }
 
+int LinkTangentSize(const Calibration& theta) {
+  const int size = ImuTangentSize(theta.imu);
+  return theta.imu1 ? size + ImuTangentSize(*theta.imu1) + kMountTangentSize
+                    : size;
+}
+
 int CameraTangentSize(const CameraCalibration& camera) {
   return SensorTangentSize(kCameraBlocks, camera);
 }
 
 int CameraTangentOffset(const Calibration& theta, int camera) {
-  int offset = ImuTangentSize(theta.imu);
+  int offset = LinkTangentSize(theta);
   for (int j = 0; j < camera; ++j) {
     offset += CameraTangentSize(theta.cameras[j]);
   }
@@ -136,6 +142,7 @@ int TangentSize(const Calibration& theta) {
   int size =
       CameraTangentOffset(theta, static_cast<int>(theta.cameras.size())) +
       SensorTangentSize(kImuSlopes, theta.imu);
+  if (theta.imu1) size += SensorTangentSize(kImuSlopes, *theta.imu1);
   for (const CameraCalibration& camera : theta.cameras) {
     size += SensorTangentSize(kCameraSlopes, camera);
   }
@@ -181,12 +188,14 @@ Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
 
 bool SameShape(const Calibration& a, const Calibration& b) {
   if (a.cameras.size() != b.cameras.size()) return false;
+  if (a.imu1.has_value() != b.imu1.has_value()) return false;
   bool same = true;
   const auto compare =
       [&](const BlockInfo&, const auto& value, const auto& other) {
         same = same && TangentDimension(value) == TangentDimension(other);
       };
   VisitWithSlopes(compare, a.imu, b.imu);
+  if (a.imu1) VisitWithSlopes(compare, *a.imu1, *b.imu1);
   for (std::size_t j = 0; same && j < a.cameras.size(); ++j) {
     if (a.cameras[j].model != b.cameras[j].model) return false;
     VisitWithSlopes(compare, a.cameras[j], b.cameras[j]);

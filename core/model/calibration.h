@@ -1,14 +1,16 @@
 // theta, the calibration parameters of a device, as one value with a tangent
 // space of named components.
 //
-// Order of the tangent, ImuTangentSize + sum over cameras of (6 + 4 +
+// Order of the tangent, LinkTangentSize + sum over cameras of (6 + 4 +
 // distortion + 1 to 3) + slopes components:
 //   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3, and those that it has of
 //   g-sensitivity 9 and position of the accelerometer 3 or 9;
+//   imu1, if there is a second IMU: the same, then q_JI 3, p_JI 3;
 //   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1,
 //   line delay 1 if its shutter is a rolling one, and time drift 1 if its clock
 //   drifts;
-//   slopes with temperature, those that it has: of the imu, of each camera.
+//   slopes with temperature, those that it has: of the imu, of imu1, of each
+//   camera.
 // Rotations are perturbed on the right (so3.h); all other components are
 // additive. Source: Schneider et al., ICRA 2017, sections III-B and III-C; the
 // time offset and all optional parts are extensions.
@@ -16,6 +18,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +39,10 @@ inline constexpr int kAccelRotation = kAccelMisalignment + 3;
 // with all of them.
 inline constexpr int kImuTangentSize = kAccelRotation + 3;
 inline constexpr int kMaxImuTangentSize = kImuTangentSize + 9 + 9;
+// The pose of a second IMU follows its intrinsics.
+inline constexpr int kMountTangentSize = 6;
+inline constexpr int kMaxLinkTangentSize =
+    2 * kMaxImuTangentSize + kMountTangentSize;
 // Offset of each block in a camera's tangent.
 inline constexpr int kCameraRotation = 0;
 inline constexpr int kCameraPosition = kCameraRotation + 3;
@@ -75,10 +82,19 @@ struct ImuCalibration {
   Eigen::Matrix3d AccelPositions() const;
 };
 
+// The second IMU of a rig: its intrinsics in its own frame J, that of its
+// gyroscope, with I replaced by J above; and its pose. T_JI takes a point from
+// I to J, as T_CI of a camera takes it to C.
+struct SecondImuCalibration : ImuCalibration {
+  Eigen::Quaterniond q_JI = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d p_JI = Eigen::Vector3d::Zero();  // [m]
+};
+
 inline constexpr double kDefaultReferenceTemperature_c = 25;
 
 struct Calibration {
-  ImuCalibration imu;
+  ImuCalibration imu;  // defines I
+  std::optional<SecondImuCalibration> imu1 = std::nullopt;
   std::vector<CameraCalibration> cameras;
   // Temperature [deg C] at which the values hold whose slopes it has; constant,
   // not estimated.
@@ -99,9 +115,13 @@ struct TangentComponent {
 // Dimension of the tangent of a calibration.
 int TangentSize(const Calibration& theta);
 
-// Dimension of the tangent of the IMU, the first part of that of theta, without
-// its slopes.
+// Dimension of the tangent of an IMU without its slopes and its pose; that of
+// the first IMU is the first part of the tangent of theta.
 int ImuTangentSize(const ImuCalibration& imu);
+
+// Dimension of the tangent of all IMUs without slopes, on which inertial
+// factors depend: the first part of that of theta.
+int LinkTangentSize(const Calibration& theta);
 
 // Dimension of the tangent of camera j without its slopes, and its offset in
 // that of theta.
@@ -132,8 +152,9 @@ Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b);
 Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
                               const Eigen::VectorXd& d);
 
-// Same number of cameras, each with the same distortion model, the same
-// optional blocks, and the same reference temperature if there are slopes.
+// The same IMUs, the same number of cameras, each with the same distortion
+// model, the same optional blocks, and the same reference temperature if there
+// are slopes.
 bool SameShape(const Calibration& a, const Calibration& b);
 
 // Value of each component for display: the scalar itself, and for a rotation

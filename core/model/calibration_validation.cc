@@ -95,9 +95,8 @@ std::string Fault(const BlockInfo& info, const Value& value) {
   }
 }
 
-void CheckImu(const ImuCalibration& imu,
-              const std::string& path,
-              ViolationList* list) {
+template <class Imu>
+void CheckImu(const Imu& imu, const std::string& path, ViolationList* list) {
   VisitWithSlopes(
       [&](const BlockInfo& info, const auto& value) {
         AddIf(path + "." + std::string(info.field), Fault(info, value), list);
@@ -126,12 +125,14 @@ std::vector<Violation> Validate(const Calibration& theta,
                                 const std::string& prefix) {
   // kMaxCameras cameras cannot produce more violations.
   ViolationList list(
-      static_cast<int>(std::size(kImuBlocks) + std::size(kImuSlopes) + 1) +
+      static_cast<int>(2 * (std::size(kImuBlocks) + std::size(kImuSlopes)) +
+                       std::size(kMountBlocks) + 1) +
       static_cast<int>(std::size(kCameraBlocks) + std::size(kCameraSlopes) +
                        3) *
           kMaxCameras);
   const std::string begin = prefix.empty() ? "" : prefix + ".";
   CheckImu(theta.imu, begin + "imu", &list);
+  if (theta.imu1) CheckImu(*theta.imu1, begin + "imu1", &list);
   const double reference_c = theta.reference_temperature_c;
   const SegmentLimits limits;
   if (!(reference_c >= limits.min_temperature_c &&

@@ -54,8 +54,9 @@ struct BlockInfo {
   double prior_sigma = 0;
   Accepted accepted = Accepted::kMagnitude;
   double limit = 0;
-  std::string_view group = {};  // of a camera's block; an IMU's is in "imu"
-  std::string_view words;       // before the name of a component, for people
+  // That of a camera's block; an IMU's is in the group with the IMU's name.
+  std::string_view group = {};
+  std::string_view words;  // before the name of a component, for people
   GradeTolerance tolerance = {};
   // If false, it is held constant unless the rig estimates it (BlockSetting).
   bool estimated = true;
@@ -155,6 +156,27 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
       .estimated = false,
       .sizes = {9, 3}},
      &ImuCalibration::accel_position},
+};
+
+// The pose of a second IMU. Prior sigmas are those of a drawing or a data
+// sheet: 0.5 degrees and 5 mm.
+inline constexpr Block<SecondImuCalibration> kMountBlocks[] = {
+    {{.name = "q_JI",
+      .field = "q_JI",
+      .unit = "rad",
+      .sigma_ref = 5e-3,
+      .accepted = Accepted::kUnit,
+      .limit = 1e-6,
+      .words = "the rotation relative to the first IMU about "},
+     &SecondImuCalibration::q_JI},
+    {{.name = "p_JI",
+      .field = "p_JI",
+      .unit = "m",
+      .sigma_ref = 1.3e-2,
+      .accepted = Accepted::kLength,
+      .limit = 1e3,
+      .words = "the distance from the first IMU along "},
+     &SecondImuCalibration::p_JI},
 };
 
 inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
@@ -418,6 +440,7 @@ static_assert(OffsetOf(kImuBlocks, &ImuCalibration::s_a) == kAccelScale);
 static_assert(OffsetOf(kImuBlocks, &ImuCalibration::m_a) == kAccelMisalignment);
 static_assert(OffsetOf(kImuBlocks, &ImuCalibration::q_AI) == kAccelRotation);
 static_assert(OffsetOf(kImuBlocks) == kImuTangentSize);
+static_assert(OffsetOf(kMountBlocks) == kMountTangentSize);
 static_assert(OffsetOf(kCameraBlocks, &CameraCalibration::q_CI) ==
               kCameraRotation);
 static_assert(OffsetOf(kCameraBlocks, &CameraCalibration::p_CI) ==
@@ -427,14 +450,18 @@ static_assert(OffsetOf(kCameraBlocks, &CameraCalibration::f) ==
 static_assert(OffsetOf(kCameraBlocks, &CameraCalibration::distortion) ==
               kCameraDistortion);
 
+inline constexpr int kFirstImu = -1;
+inline constexpr int kSecondImu = -2;
+
 struct BlockPlace {
   const BlockInfo& info;
   int offset;  // in the tangent of theta
-  int camera;  // -1: the IMU
+  int camera;  // negative: kFirstImu or kSecondImu
 
-  // "imu" or "cam0"
+  // "imu", "imu1" or "cam0"
   std::string Sensor() const {
-    return camera < 0 ? "imu" : "cam" + std::to_string(camera);
+    if (camera == kFirstImu) return "imu";
+    return camera == kSecondImu ? "imu1" : "cam" + std::to_string(camera);
   }
   // "imu.gyro.scale"
   std::string Name() const { return Sensor() + "." + std::string(info.name); }
@@ -456,11 +483,16 @@ void VisitSensorBlocks(const Blocks& blocks,
   }
 }
 
-// The same for all blocks of an IMU or of a camera, and the slopes of those.
+// The same for all blocks of an IMU, with its pose if it is the second one, or
+// of a camera, and the slopes of those.
 template <class Visitor, class Sensor, class... Sensors>
 void VisitWithSlopes(const Visitor& visit, Sensor& sensor, Sensors&... others) {
-  if constexpr (std::is_same_v<std::remove_const_t<Sensor>, ImuCalibration>) {
+  using Plain = std::remove_const_t<Sensor>;
+  if constexpr (std::is_base_of_v<ImuCalibration, Plain>) {
     VisitSensorBlocks(kImuBlocks, visit, sensor, others...);
+    if constexpr (std::is_same_v<Plain, SecondImuCalibration>) {
+      VisitSensorBlocks(kMountBlocks, visit, sensor, others...);
+    }
     VisitSensorBlocks(kImuSlopes, visit, sensor, others...);
   } else {
     VisitSensorBlocks(kCameraBlocks, visit, sensor, others...);
@@ -473,24 +505,32 @@ void VisitWithSlopes(const Visitor& visit, Sensor& sensor, Sensors&... others) {
 template <class Visitor, class Theta, class... Thetas>
 void VisitBlocks(const Visitor& visit, Theta& theta, Thetas&... others) {
   int offset = 0;
-  int camera = -1;
+  int camera = kFirstImu;
   const auto visit_block =
       [&](const BlockInfo& info, auto& value, auto&... values) {
         if (TangentDimension(value) == 0) return;
         visit(BlockPlace{info, offset, camera}, value, values...);
         offset += TangentDimension(value);
       };
-  const auto visit_all = [&](const auto& of_imu, const auto& of_cameras) {
-    camera = -1;
+  const auto visit_all = [&](const auto& of_imu,
+                             const auto& of_mount,
+                             const auto& of_cameras) {
+    camera = kFirstImu;
     VisitSensorBlocks(of_imu, visit_block, theta.imu, others.imu...);
+    if (theta.imu1) {
+      camera = kSecondImu;
+      VisitSensorBlocks(of_imu, visit_block, *theta.imu1, *others.imu1...);
+      VisitSensorBlocks(of_mount, visit_block, *theta.imu1, *others.imu1...);
+    }
     for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
       camera = static_cast<int>(j);
       VisitSensorBlocks(
           of_cameras, visit_block, theta.cameras[j], others.cameras[j]...);
     }
   };
-  visit_all(kImuBlocks, kCameraBlocks);
-  visit_all(kImuSlopes, kCameraSlopes);
+  constexpr std::array<Block<SecondImuCalibration>, 0> kNone = {};
+  visit_all(kImuBlocks, kMountBlocks, kCameraBlocks);
+  visit_all(kImuSlopes, kNone, kCameraSlopes);
 }
 
 // The name of the block of each component, in the order of the tangent.

@@ -71,8 +71,9 @@ bool IsDeclaredEstimated(std::string_view block) {
       if (one.info.name == name) estimated = one.info.estimated;
     }
   };
-  if (block.substr(0, dot) == "imu") {
+  if (block.starts_with("imu")) {
     find_in(kImuBlocks);
+    find_in(kMountBlocks);
     find_in(kImuSlopes);
   } else {
     find_in(kCameraBlocks);
@@ -109,13 +110,15 @@ std::vector<ParameterGroup> DefaultGroups(
 std::vector<ParameterGroup> DefaultGroups(
     const std::vector<BlockSetting>& blocks, const Calibration& theta) {
   std::vector<ParameterGroup> groups = {
-      {"imu", {}}, {"camera", {}}, {"extrinsics", {}}};
+      {"imu", {}}, {"imu1", {}}, {"camera", {}}, {"extrinsics", {}}};
   std::set<std::string_view> estimated;  // blocks of cameras
   VisitBlocks(
       [&](const BlockPlace& place, const auto&) {
         if (!IsEstimated(blocks, place.Name())) return;
-        if (place.camera < 0) {
+        if (place.camera == kFirstImu) {
           groups[0].patterns = {"imu.*"};
+        } else if (place.camera == kSecondImu) {
+          groups[1].patterns = {"imu1.*"};
         } else {
           estimated.insert(place.info.name);
         }
@@ -156,6 +159,7 @@ void AddEstimatedBlocks(const std::vector<BlockSetting>& blocks,
     };
   };
   VisitWithSlopes(add_to("imu"), theta->imu);
+  if (theta->imu1) VisitWithSlopes(add_to("imu1"), *theta->imu1);
   for (std::size_t j = 0; j < theta->cameras.size(); ++j) {
     VisitWithSlopes(add_to("cam" + std::to_string(j)), theta->cameras[j]);
   }

@@ -44,8 +44,10 @@ bool IsEstimated(const std::vector<BlockSetting>& settings,
                  const std::string& block);
 
 // The three groups of the paper: "imu", "camera" (f, c, distortion of every
-// camera) and "extrinsics" (q_CI, p_CI of every camera); and "time" (the time
-// offset of every camera, and the line delay of each with a rolling shutter).
+// camera) and "extrinsics" (q_CI, p_CI of every camera); "imu1" (intrinsics and
+// pose of a second IMU), apart from the first one, since a segment may excite
+// one of them and saturate the other; and "time" (the time offset of every
+// camera, and the line delay of each with a rolling shutter).
 // Only those of which a block is estimated, in a rig with this number of
 // cameras without optional blocks.
 std::vector<ParameterGroup> DefaultGroups(
@@ -90,6 +92,9 @@ struct Rig {
   Calibration factory;
   ImuNoise imu_noise;
   ImuFullScale imu_full_scale;
+  // Those of the second IMU, if the rig has one.
+  ImuNoise imu1_noise;
+  ImuFullScale imu1_full_scale;
   double pixel_sigma_px = 1.0;
   double gravity_mps2 = 9.81;  // g = (0, 0, -gravity) in G
   std::vector<ParameterGroup> groups = DefaultGroups();

@@ -58,28 +58,33 @@ void CheckRange(const std::string& field,
                 " and " + Readable(range.high));
 }
 
-void CheckImuNoise(const ImuNoise& noise, ViolationList* list) {
-  CheckRange("imu_noise.gyro_noise_density",
+void CheckImuNoise(const std::string& field,
+                   const ImuNoise& noise,
+                   ViolationList* list) {
+  CheckRange(field + ".gyro_noise_density",
              noise.gyro_noise_density,
              kGyroNoise,
              list);
-  CheckRange("imu_noise.accel_noise_density",
+  CheckRange(field + ".accel_noise_density",
              noise.accel_noise_density,
              kAccelNoise,
              list);
-  CheckRange("imu_noise.gyro_bias_random_walk",
+  CheckRange(field + ".gyro_bias_random_walk",
              noise.gyro_bias_random_walk,
              kGyroWalk,
              list);
-  CheckRange("imu_noise.accel_bias_random_walk",
+  CheckRange(field + ".accel_bias_random_walk",
              noise.accel_bias_random_walk,
              kAccelWalk,
              list);
 }
 
-void CheckImuFullScale(const ImuFullScale& full_scale, ViolationList* list) {
-  CheckRange("imu.gyro_max", full_scale.gyro_radps, kGyroFullScale, list);
-  CheckRange("imu.accel_max", full_scale.accel_mps2, kAccelFullScale, list);
+void CheckImuFullScale(const std::string& field,
+                       const ImuFullScale& full_scale,
+                       ViolationList* list) {
+  CheckRange(field + ".gyro_max", full_scale.gyro_radps, kGyroFullScale, list);
+  CheckRange(
+      field + ".accel_max", full_scale.accel_mps2, kAccelFullScale, list);
 }
 
 // Adds a violation and returns false for a list that is too long to inspect.
@@ -238,8 +243,12 @@ std::vector<Violation> Validate(const Rig& rig) {
   for (Violation& violation : Validate(rig.factory, "factory")) {
     list.Add(std::move(violation.field), std::move(violation.message));
   }
-  CheckImuNoise(rig.imu_noise, &list);
-  CheckImuFullScale(rig.imu_full_scale, &list);
+  CheckImuNoise("imu_noise", rig.imu_noise, &list);
+  CheckImuFullScale("imu", rig.imu_full_scale, &list);
+  if (rig.factory.imu1) {
+    CheckImuNoise("imu1_noise", rig.imu1_noise, &list);
+    CheckImuFullScale("imu1", rig.imu1_full_scale, &list);
+  }
   CheckRange("pixel_sigma_px", rig.pixel_sigma_px, kPixelSigma, &list);
   CheckRange("gravity_mps2", rig.gravity_mps2, kGravity, &list);
   // Patterns have no components to match unless the number of cameras is valid.

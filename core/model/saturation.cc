@@ -29,8 +29,8 @@ bool IsTooSaturated(std::span<const ImuSample> samples, std::size_t count) {
 }
 
 void RemoveSaturatedReadings(const ImuFullScale& full_scale,
-                             MotionSegment* segment) {
-  std::erase_if(segment->imu, [&](const ImuSample& sample) {
+                             std::vector<ImuSample>* samples) {
+  std::erase_if(*samples, [&](const ImuSample& sample) {
     return IsSaturated(sample, full_scale);
   });
 }

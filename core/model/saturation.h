@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "core/model/rig.h"
 #include "core/model/segment.h"
@@ -24,6 +25,6 @@ std::size_t CountSaturatedReadings(std::span<const ImuSample> samples,
 bool IsTooSaturated(std::span<const ImuSample> samples, std::size_t count);
 
 void RemoveSaturatedReadings(const ImuFullScale& full_scale,
-                             MotionSegment* segment);
+                             std::vector<ImuSample>* samples);
 
 }  // namespace selfcal

@@ -7,7 +7,7 @@
 namespace selfcal {
 
 KeyframeState BoxPlus(const KeyframeState& state,
-                      const Eigen::Matrix<double, 15, 1>& delta) {
+                      const Eigen::Ref<const Eigen::VectorXd>& delta) {
   KeyframeState moved = state;
   moved.q_GI =
       (state.q_GI * Exp(delta.segment<3>(kStateRotation))).normalized();
@@ -15,6 +15,10 @@ KeyframeState BoxPlus(const KeyframeState& state,
   moved.v_GI += delta.segment<3>(kStateVelocity);
   moved.b_a += delta.segment<3>(kStateAccelBias);
   moved.b_g += delta.segment<3>(kStateGyroBias);
+  if (delta.size() == kStateTangentSize) return moved;
+  moved.v_GJ += delta.segment<3>(kStateTangentSize);
+  moved.b_a1 += delta.segment<3>(kStateTangentSize + 3);
+  moved.b_g1 += delta.segment<3>(kStateTangentSize + 6);
   return moved;
 }
 
@@ -23,9 +27,10 @@ double SessionTime(const MotionSegment& segment, const KeyframeState& x) {
   return 1e-9 * static_cast<double>(x.t_ns - *segment.session_start_ns);
 }
 
-std::span<const ImuSample> SamplesFromFirstKeyframe(
-    const MotionSegment& segment) {
-  const std::vector<ImuSample>& imu = segment.imu;
+namespace {
+
+std::span<const ImuSample> FromFirstKeyframe(
+    const MotionSegment& segment, const std::vector<ImuSample>& imu) {
   if (segment.keyframes.empty()) return imu;
   const auto later = [](std::int64_t t_ns, const ImuSample& sample) {
     return t_ns < sample.t_ns;
@@ -36,9 +41,23 @@ std::span<const ImuSample> SamplesFromFirstKeyframe(
   return {first, imu.end()};
 }
 
-std::span<const ImuSample> SamplesBetweenKeyframes(
+}  // namespace
+
+std::span<const ImuSample> SamplesFromFirstKeyframe(
     const MotionSegment& segment) {
-  const std::span<const ImuSample> imu = SamplesFromFirstKeyframe(segment);
+  return FromFirstKeyframe(segment, segment.imu);
+}
+
+std::span<const ImuSample> SecondSamplesFromFirstKeyframe(
+    const MotionSegment& segment) {
+  return FromFirstKeyframe(segment, segment.imu1);
+}
+
+namespace {
+
+// The samples `imu` from the first keyframe on, up to the last one.
+std::span<const ImuSample> ToLastKeyframe(const MotionSegment& segment,
+                                          std::span<const ImuSample> imu) {
   if (segment.keyframes.empty()) return imu;
   const auto earlier = [](const ImuSample& sample, std::int64_t t_ns) {
     return sample.t_ns < t_ns;
@@ -47,6 +66,18 @@ std::span<const ImuSample> SamplesBetweenKeyframes(
       imu.begin(), imu.end(), segment.keyframes.back().t_ns, earlier);
   if (end != imu.end()) ++end;
   return {imu.begin(), end};
+}
+
+}  // namespace
+
+std::span<const ImuSample> SamplesBetweenKeyframes(
+    const MotionSegment& segment) {
+  return ToLastKeyframe(segment, SamplesFromFirstKeyframe(segment));
+}
+
+std::span<const ImuSample> SecondSamplesBetweenKeyframes(
+    const MotionSegment& segment) {
+  return ToLastKeyframe(segment, SecondSamplesFromFirstKeyframe(segment));
 }
 
 }  // namespace selfcal

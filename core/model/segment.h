@@ -24,6 +24,11 @@ struct KeyframeState {
   Eigen::Vector3d v_GI = Eigen::Vector3d::Zero();  // [m/s], in G
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();   // [m/s^2], in A
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();   // [rad/s], in I
+  // Motion of the second IMU of a rig that has one (second_imu.h), which no
+  // SLAM system estimates: velocity of its origin, and its biases.
+  Eigen::Vector3d v_GJ = Eigen::Vector3d::Zero();  // [m/s], in G
+  Eigen::Vector3d b_a1 = Eigen::Vector3d::Zero();  // [m/s^2], in its A
+  Eigen::Vector3d b_g1 = Eigen::Vector3d::Zero();  // [rad/s], in J
 };
 
 inline constexpr int kStateTangentSize = 15;
@@ -32,10 +37,14 @@ inline constexpr int kStatePosition = 3;
 inline constexpr int kStateVelocity = 6;
 inline constexpr int kStateAccelBias = 9;
 inline constexpr int kStateGyroBias = 12;
+// Those of a second IMU (v_GJ 3, b_a1 3, b_g1 3) follow.
+inline constexpr int kMotionTangentSize = 9;
+inline constexpr int kStateTangentSize2 =
+    kStateTangentSize + kMotionTangentSize;
 
-// x_k [+] delta, in the tangent order above.
+// x_k [+] delta, in the tangent order above: 15 components, or 24.
 KeyframeState BoxPlus(const KeyframeState& state,
-                      const Eigen::Matrix<double, 15, 1>& delta);
+                      const Eigen::Ref<const Eigen::VectorXd>& delta);
 
 // Raw readings; biases and intrinsics are not corrected.
 struct ImuSample {
@@ -84,6 +93,9 @@ struct MotionSegment {
   // If the next segment of the session follows directly, with the next index,
   // the samples extend to its first keyframe, so that neighbours can be joined.
   std::vector<ImuSample> imu;
+  // Samples of the second IMU, by the same clock; the same rules hold for them.
+  // Empty if the rig has none.
+  std::vector<ImuSample> imu1 = {};
   std::vector<Landmark> landmarks;        // ids distinct
   std::vector<Observation> observations;  // any order, at most one for each
                                           // (keyframe, camera, landmark)
@@ -105,11 +117,18 @@ double SessionTime(const MotionSegment& segment, const KeyframeState& x);
 std::span<const ImuSample> SamplesBetweenKeyframes(
     const MotionSegment& segment);
 
+// The same of the second IMU.
+std::span<const ImuSample> SecondSamplesBetweenKeyframes(
+    const MotionSegment& segment);
+
 // Samples from the last at or before the first keyframe on: those of inertial
 // factors. The integration also uses the neighbours of the samples about an
 // interval: with those of the padding before the first keyframe, its last
 // digits would not be those of a segment without.
 std::span<const ImuSample> SamplesFromFirstKeyframe(
+    const MotionSegment& segment);
+// The same of the second IMU.
+std::span<const ImuSample> SecondSamplesFromFirstKeyframe(
     const MotionSegment& segment);
 
 // One violated rule: the field, and what to do.

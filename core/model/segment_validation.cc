@@ -216,18 +216,18 @@ void CheckKeyframes(const MotionSegment& segment,
   }
 }
 
-void CheckImu(const MotionSegment& segment,
-              const SegmentLimits& limits,
-              ViolationList* list) {
-  const std::vector<ImuSample>& imu = segment.imu;
+void CheckReadings(std::string_view name,
+                   const std::vector<ImuSample>& imu,
+                   const SegmentLimits& limits,
+                   ViolationList* list) {
   for (std::size_t i = 0; i < imu.size() && !list->cut(); ++i) {
-    AddIf("imu", i, "t_ns", TimeFault(imu, i, limits.max_imu_gap_s), list);
-    AddIf("imu",
+    AddIf(name, i, "t_ns", TimeFault(imu, i, limits.max_imu_gap_s), list);
+    AddIf(name,
           i,
           "gyro",
           VectorFault(imu[i].gyro, limits.max_gyro_radps, "rad/s"),
           list);
-    AddIf("imu",
+    AddIf(name,
           i,
           "accel",
           VectorFault(imu[i].accel, limits.max_accel_mps2, "m/s^2"),
@@ -236,21 +236,23 @@ void CheckImu(const MotionSegment& segment,
 }
 
 // The samples must cover all keyframes, and not extend far beyond them.
-void CheckImuCover(const MotionSegment& segment,
+void CheckImuCover(std::string_view name,
+                   const std::vector<ImuSample>& imu,
+                   const MotionSegment& segment,
                    const SegmentLimits& limits,
                    ViolationList* list) {
-  if (segment.keyframes.empty() || segment.imu.empty()) return;
+  if (segment.keyframes.empty() || imu.empty()) return;
   const std::int64_t begin_ns = segment.keyframes.front().t_ns;
   const std::int64_t end_ns = segment.keyframes.back().t_ns;
-  const std::int64_t first_ns = segment.imu.front().t_ns;
-  const std::int64_t last_ns = segment.imu.back().t_ns;
+  const std::int64_t first_ns = imu.front().t_ns;
+  const std::int64_t last_ns = imu.back().t_ns;
   if (first_ns > begin_ns) {
-    list->Add(ElementPath("imu", 0, "t_ns"),
+    list->Add(ElementPath(name, 0, "t_ns"),
               std::to_string(first_ns) +
                   " ns is after the first keyframe; send the samples from " +
                   std::to_string(begin_ns) + " ns on");
   }
-  const std::string last = ElementPath("imu", segment.imu.size() - 1, "t_ns");
+  const std::string last = ElementPath(name, imu.size() - 1, "t_ns");
   if (last_ns < end_ns) {
     list->Add(last,
               std::to_string(last_ns) +
@@ -263,6 +265,23 @@ void CheckImuCover(const MotionSegment& segment,
                   " s after the last keyframe; at most " +
                   Readable(limits.max_keyframe_gap_s) + " s are allowed");
   }
+}
+
+void CheckImu(std::string_view name,
+              const std::vector<ImuSample>& imu,
+              const MotionSegment& segment,
+              const SegmentLimits& limits,
+              ViolationList* list) {
+  constexpr int kMinImuSamples = 2;
+  if (!CheckCount(std::string(name),
+                  imu.size(),
+                  kMinImuSamples,
+                  limits.max_imu_samples,
+                  list)) {
+    return;
+  }
+  CheckReadings(name, imu, limits, list);
+  CheckImuCover(name, imu, segment, limits, list);
 }
 
 // Returns for each key the index of the first equal key before it, or -1.
@@ -392,14 +411,13 @@ std::vector<Violation> Validate(const MotionSegment& segment,
                                             limits.max_keyframes,
                                             &list);
   if (keyframes_counted) CheckKeyframes(segment, limits, &list);
-  constexpr int kMinImuSamples = 2;
-  if (CheckCount("imu",
-                 segment.imu.size(),
-                 kMinImuSamples,
-                 limits.max_imu_samples,
-                 &list)) {
-    CheckImu(segment, limits, &list);
-    CheckImuCover(segment, limits, &list);
+  CheckImu("imu", segment.imu, segment, limits, &list);
+  if (theta.imu1) {
+    CheckImu("imu1", segment.imu1, segment, limits, &list);
+  } else if (!segment.imu1.empty()) {
+    list.Add("imu1",
+             "has " + std::to_string(segment.imu1.size()) +
+                 " samples, but the rig has no second IMU; send none");
   }
   if (CheckCount("landmarks",
                  segment.landmarks.size(),

@@ -23,9 +23,16 @@ void VisitSlopesOf(const Slopes& slopes, Sensor& sensor, const Visitor& visit) {
   }
 }
 
+ImuCalibration& AsImu(SecondImuCalibration& imu) { return imu; }
+const ImuCalibration& AsImu(const SecondImuCalibration& imu) { return imu; }
+
 template <class Theta, class Visitor>
 void VisitSlopes(Theta& theta, const Visitor& visit) {
   VisitSlopesOf(kImuSlopes, theta.imu, visit);
+  if (theta.imu1) {
+    auto& imu1 = AsImu(*theta.imu1);
+    VisitSlopesOf(kImuSlopes, imu1, visit);
+  }
   for (auto& camera : theta.cameras) {
     VisitSlopesOf(kCameraSlopes, camera, visit);
   }

@@ -42,4 +42,23 @@ Rig HandheldRig(const std::string& id) {
   return rig;
 }
 
+void AddSecondImu(Rig* rig) {
+  SecondImuCalibration& imu = rig->factory.imu1.emplace();
+  imu.s_g = {0.991, 1.007, 0.996};
+  imu.m_g = {-0.005, 0.004, 0.003};
+  imu.s_a = {1.009, 0.987, 1.012};
+  imu.m_a = {0.005, -0.004, 0.006};
+  imu.q_AI = Exp(0.0174533 * Eigen::Vector3d(-1, 2, 2) / 3);
+  Eigen::Matrix3d R_JI;
+  R_JI << 0, 1, 0, -1, 0, 0, 0, 0, 1;
+  imu.q_JI = Exp({0.03, 0.02, -0.04}) * Eigen::Quaterniond(R_JI);
+  imu.q_JI.normalize();
+  imu.p_JI = {0.041, -0.027, 0.018};
+  rig->imu1_noise.gyro_noise_density = 2.4e-4;
+  rig->imu1_noise.accel_noise_density = 3e-3;
+  rig->imu1_noise.gyro_bias_random_walk = 3e-5;
+  rig->imu1_noise.accel_bias_random_walk = 4e-4;
+  rig->groups = DefaultGroups(rig->blocks, rig->factory);
+}
+
 }  // namespace selfcal

@@ -10,50 +10,70 @@
 namespace selfcal {
 namespace {
 
+// Samples of the second IMU come this much later than those of the first.
+constexpr double kSecondPhase_s = 7e-4;
+
+// An IMU that is simulated: its own parameters, and its place on the body.
+struct Simulated {
+  const ImuCalibration& imu;
+  const ImuNoise& density;
+  Eigen::Vector3d b_a0, b_g0;
+  std::uint64_t noise_stream, walk_stream;
+  double phase_s = 0;
+  const SecondImuCalibration* mount = nullptr;  // null: the frame of the body
+};
+
 // Noise-free readings and the true signals, without biases.
 ImuReadings PerfectReadings(const Rig& rig,
-                            const ImuCalibration& imu,
+                            const Simulated& of,
                             const Trajectory& trajectory,
                             double rate_hz) {
-  const ImuResponse response(imu);
+  const ImuResponse response(of.imu);
   const Eigen::Vector3d g(0, 0, -rig.gravity_mps2);
   const auto end_ns =
       static_cast<std::int64_t>(std::floor(trajectory.duration_s() * 1e9));
+  const std::int64_t phase_ns = std::llround(of.phase_s * 1e9);
   ImuReadings readings;
   for (std::int64_t i = 0;; ++i) {
     ImuSample sample;
-    sample.t_ns = std::llround(static_cast<double>(i) * 1e9 / rate_hz);
+    sample.t_ns =
+        std::llround(static_cast<double>(i) * 1e9 / rate_hz) + phase_ns;
     if (sample.t_ns > end_ns) return readings;
     const BodyMotion motion =
         trajectory.At(static_cast<double>(sample.t_ns) * 1e-9);
-    const Eigen::Vector3d f_I = motion.q_GI.conjugate() * (motion.a_GI - g);
-    const Eigen::Vector3d f_A =
-        response.ForceRead(motion.w_I, motion.dw_I, f_I);
-    sample.gyro = response.Gyro(motion.w_I, f_A);
+    Eigen::Vector3d f = motion.q_GI.conjugate() * (motion.a_GI - g);
+    Eigen::Vector3d w = motion.w_I, dw = motion.dw_I;
+    if (of.mount != nullptr) {
+      const Eigen::Quaterniond& q_JI = of.mount->q_JI;
+      const Eigen::Vector3d p_IJ = -(q_JI.conjugate() * of.mount->p_JI);
+      f = q_JI * (f + ForceByPosition<double>(w, dw) * p_IJ);
+      w = q_JI * w;
+      dw = q_JI * dw;
+    }
+    const Eigen::Vector3d f_A = response.ForceRead(w, dw, f);
+    sample.gyro = response.Gyro(w, f_A);
     sample.accel = response.Accel(f_A);
     readings.noise_free.push_back(sample);
-    readings.w_I.push_back(motion.w_I);
-    readings.f_I.push_back(f_I);
+    readings.w_I.push_back(w);
+    readings.f_I.push_back(f);
   }
 }
 
-}  // namespace
-
-ImuReadings SimulateImu(const Rig& rig,
-                        const ImuCalibration& imu,
-                        const Trajectory& trajectory,
-                        const SimulationOptions& options) {
+ImuReadings SimulateReadings(const Rig& rig,
+                             const Simulated& of,
+                             const Trajectory& trajectory,
+                             const SimulationOptions& options) {
   ImuReadings readings =
-      PerfectReadings(rig, imu, trajectory, options.imu_rate_hz);
+      PerfectReadings(rig, of, trajectory, options.imu_rate_hz);
   readings.measured = readings.noise_free;
-  Random noise(options.seed, kImuNoiseStream);
-  Random walk(options.seed, kBiasWalkStream);
-  const ImuNoise& density = rig.imu_noise;
+  Random noise(options.seed, of.noise_stream);
+  Random walk(options.seed, of.walk_stream);
+  const ImuNoise& density = of.density;
   const double on = options.noise ? 1 : 0;
   const double to_sample = on * std::sqrt(options.imu_rate_hz);
   const double to_step = on / std::sqrt(options.imu_rate_hz);
-  Eigen::Vector3d b_a = options.b_a0;
-  Eigen::Vector3d b_g = options.b_g0;
+  Eigen::Vector3d b_a = of.b_a0;
+  Eigen::Vector3d b_g = of.b_g0;
   for (std::size_t i = 0; i < readings.measured.size(); ++i) {
     readings.noise_free[i].gyro += b_g;
     readings.noise_free[i].accel += b_a;
@@ -68,6 +88,69 @@ ImuReadings SimulateImu(const Rig& rig,
     b_g += density.gyro_bias_random_walk * to_step * walk.Normal3();
   }
   return readings;
+}
+
+// Biases between samples, linearly interpolated.
+struct Biases {
+  Eigen::Vector3d b_a, b_g;
+};
+
+Biases BiasesAt(const ImuReadings& imu, std::int64_t t_ns) {
+  const std::size_t i = SampleBefore(imu.measured, t_ns);
+  const std::size_t j = std::min(i + 1, imu.measured.size() - 1);
+  const double step =
+      static_cast<double>(imu.measured[j].t_ns - imu.measured[i].t_ns);
+  const double u =
+      step > 0 ? static_cast<double>(t_ns - imu.measured[i].t_ns) / step : 0;
+  return {imu.b_a[i] + u * (imu.b_a[j] - imu.b_a[i]),
+          imu.b_g[i] + u * (imu.b_g[j] - imu.b_g[i])};
+}
+
+}  // namespace
+
+ImuReadings SimulateImu(const Rig& rig,
+                        const ImuCalibration& imu,
+                        const Trajectory& trajectory,
+                        const SimulationOptions& options) {
+  return SimulateReadings(rig,
+                          {.imu = imu,
+                           .density = rig.imu_noise,
+                           .b_a0 = options.b_a0,
+                           .b_g0 = options.b_g0,
+                           .noise_stream = kImuNoiseStream,
+                           .walk_stream = kBiasWalkStream},
+                          trajectory,
+                          options);
+}
+
+ImuReadings SimulateSecondImu(const Rig& rig,
+                              const SecondImuCalibration& imu,
+                              const Trajectory& trajectory,
+                              const SimulationOptions& options) {
+  return SimulateReadings(rig,
+                          {.imu = imu,
+                           .density = rig.imu1_noise,
+                           .b_a0 = options.second_b_a0,
+                           .b_g0 = options.second_b_g0,
+                           .noise_stream = kSecondImuNoiseStream,
+                           .walk_stream = kSecondBiasWalkStream,
+                           .phase_s = kSecondPhase_s,
+                           .mount = &imu},
+                          trajectory,
+                          options);
+}
+
+void AddSecondMotion(const Trajectory& trajectory,
+                     const SecondImuCalibration& imu,
+                     const ImuReadings& readings,
+                     KeyframeState* state) {
+  const BodyMotion motion =
+      trajectory.At(static_cast<double>(state->t_ns) * 1e-9);
+  const Eigen::Vector3d p_IJ = -(imu.q_JI.conjugate() * imu.p_JI);
+  const Biases biases = BiasesAt(readings, state->t_ns);
+  state->v_GJ = motion.v_GI + motion.q_GI * motion.w_I.cross(p_IJ);
+  state->b_a1 = biases.b_a;
+  state->b_g1 = biases.b_g;
 }
 
 std::vector<std::size_t> SamplesThatArrive(
@@ -111,19 +194,14 @@ KeyframeState TrueState(const Trajectory& trajectory,
                         const ImuReadings& imu,
                         std::int64_t t_ns) {
   const BodyMotion motion = trajectory.At(static_cast<double>(t_ns) * 1e-9);
-  const std::size_t i = SampleBefore(imu.measured, t_ns);
-  const std::size_t j = std::min(i + 1, imu.measured.size() - 1);
-  const double step =
-      static_cast<double>(imu.measured[j].t_ns - imu.measured[i].t_ns);
-  const double u =
-      step > 0 ? static_cast<double>(t_ns - imu.measured[i].t_ns) / step : 0;
+  const Biases biases = BiasesAt(imu, t_ns);
   KeyframeState state;
   state.t_ns = t_ns;
   state.q_GI = motion.q_GI;
   state.p_GI = motion.p_GI;
   state.v_GI = motion.v_GI;
-  state.b_a = imu.b_a[i] + u * (imu.b_a[j] - imu.b_a[i]);
-  state.b_g = imu.b_g[i] + u * (imu.b_g[j] - imu.b_g[i]);
+  state.b_a = biases.b_a;
+  state.b_g = biases.b_g;
   return state;
 }
 

@@ -13,7 +13,8 @@
 
 namespace selfcal {
 
-// All vectors have one entry for each sample.
+// All vectors have one entry for each sample. Signals are those of the frame of
+// the IMU and of its origin.
 struct ImuReadings {
   std::vector<ImuSample> measured;    // with biases and noise
   std::vector<ImuSample> noise_free;  // with biases
@@ -32,6 +33,19 @@ ImuReadings SimulateImu(const Rig& rig,
                         const ImuCalibration& imu,
                         const Trajectory& trajectory,
                         const SimulationOptions& options);
+
+// The same of a second IMU, which moves rigidly with the body. Its samples are
+// at other times than those of the first one.
+ImuReadings SimulateSecondImu(const Rig& rig,
+                              const SecondImuCalibration& imu,
+                              const Trajectory& trajectory,
+                              const SimulationOptions& options);
+
+// Adds the true motion of the second IMU, at its time, to a state.
+void AddSecondMotion(const Trajectory& trajectory,
+                     const SecondImuCalibration& imu,
+                     const ImuReadings& readings,
+                     KeyframeState* state);
 
 // Selects the samples of a segment that are not lost: indices in [from, to],
 // including both ends.

@@ -23,6 +23,16 @@ Eigen::Quaterniond Turn(const Eigen::Quaterniond& q,
   return (q * Exp(angle_rad * random->Direction())).normalized();
 }
 
+void PerturbImu(const CalibrationError& error,
+                Random* random,
+                ImuCalibration* imu) {
+  imu->s_g += error.scale * Signs(random);
+  imu->m_g += error.misalignment * Signs(random);
+  imu->s_a += error.scale * Signs(random);
+  imu->m_a += error.misalignment * Signs(random);
+  imu->q_AI = Turn(imu->q_AI, error.accel_rotation_rad, random);
+}
+
 void PerturbCamera(const CalibrationError& error,
                    Random* random,
                    CameraCalibration* camera) {
@@ -44,14 +54,15 @@ Calibration PerturbCalibration(const Calibration& theta,
                                std::uint64_t seed) {
   Random random(seed, kPerturbStream);
   Calibration perturbed = theta;
-  ImuCalibration& imu = perturbed.imu;
-  imu.s_g += error.scale * Signs(&random);
-  imu.m_g += error.misalignment * Signs(&random);
-  imu.s_a += error.scale * Signs(&random);
-  imu.m_a += error.misalignment * Signs(&random);
-  imu.q_AI = Turn(imu.q_AI, error.accel_rotation_rad, &random);
+  PerturbImu(error, &random, &perturbed.imu);
   for (CameraCalibration& camera : perturbed.cameras) {
     PerturbCamera(error, &random, &camera);
+  }
+  if (perturbed.imu1) {
+    SecondImuCalibration& imu = *perturbed.imu1;
+    PerturbImu(error, &random, &imu);
+    imu.q_JI = Turn(imu.q_JI, error.imu_rotation_rad, &random);
+    imu.p_JI += error.imu_position_m * random.Direction();
   }
   return perturbed;
 }

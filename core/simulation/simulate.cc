@@ -1,5 +1,6 @@
 #include "core/simulation/simulate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -21,18 +22,23 @@ constexpr double kKeyframeJitter_s = 0.4e-3;
 
 std::vector<KeyframeState> TrueKeyframes(const Trajectory& trajectory,
                                          const ImuReadings& imu,
+                                         const ImuReadings& imu1,
                                          const TimeMargins& margins,
                                          const SimulationOptions& options) {
   Random random(options.seed, kKeyframeTimeStream);
   std::vector<KeyframeState> keyframes;
   if (imu.measured.empty()) return keyframes;
+  std::int64_t end_ns = imu.measured.back().t_ns;
+  if (!imu1.measured.empty()) {
+    end_ns = std::min(end_ns, imu1.measured.back().t_ns);
+  }
   for (int k = 0;; ++k) {
     const double t_s = k / options.keyframe_rate_hz + kKeyframeOffset_s +
                        random.Uniform(-kKeyframeJitter_s, kKeyframeJitter_s) +
                        margins.before_s;
     const std::int64_t t_ns = std::llround(t_s * 1e9);
     const std::int64_t last_ns = t_ns + std::llround(margins.after_s * 1e9);
-    if (last_ns > imu.measured.back().t_ns) return keyframes;
+    if (last_ns > end_ns) return keyframes;
     keyframes.push_back(TrueState(trajectory, imu, t_ns));
   }
 }
@@ -40,6 +46,7 @@ std::vector<KeyframeState> TrueKeyframes(const Trajectory& trajectory,
 // The whole simulated session, before it is cut into segments.
 struct Recording {
   ImuReadings imu;
+  ImuReadings imu1;  // empty without a second one
   std::vector<KeyframeState> truth;
   std::vector<KeyframeState> slam;
   FeatureTracks tracks;
@@ -53,6 +60,7 @@ class Cutter {
       : recording_(recording),
         options_(options),
         lost_samples_(options.seed, kLostSampleStream),
+        second_lost_samples_(options.seed, kSecondLostSampleStream),
         local_(recording.tracks.landmarks_G.size(), kUnseen) {}
 
   // Must be called for consecutive segments; end > begin. The IMU samples
@@ -92,10 +100,34 @@ class Cutter {
                               recording_.slam.begin() + end);
     truth->keyframes.assign(recording_.truth.begin() + begin,
                             recording_.truth.begin() + end);
-    const std::vector<ImuSample>& imu = recording_.imu.measured;
+    CutSamples(recording_.imu,
+               begin,
+               end,
+               imu_end,
+               &lost_samples_,
+               &segment->imu,
+               &truth->imu);
+    if (recording_.imu1.measured.empty()) return;
+    CutSamples(recording_.imu1,
+               begin,
+               end,
+               imu_end,
+               &second_lost_samples_,
+               &segment->imu1,
+               &truth->imu1);
+  }
+
+  void CutSamples(const ImuReadings& readings,
+                  int begin,
+                  int end,
+                  int imu_end,
+                  Random* lost_samples,
+                  std::vector<ImuSample>* measured,
+                  std::vector<ImuSample>* noise_free) const {
+    const std::vector<ImuSample>& imu = readings.measured;
     const auto add = [&](std::size_t i) {
-      segment->imu.push_back(imu[i]);
-      truth->imu.push_back(recording_.imu.noise_free[i]);
+      measured->push_back(imu[i]);
+      noise_free->push_back(readings.noise_free[i]);
     };
     const std::int64_t begin_ns = recording_.truth[begin].t_ns;
     const std::size_t from = SampleBefore(imu, begin_ns);
@@ -108,7 +140,7 @@ class Cutter {
         std::max(begin_ns - padding_ns, imu.front().t_ns);
     for (std::size_t i = SampleBefore(imu, padded_ns); i < from; ++i) add(i);
     for (const std::size_t i :
-         SamplesThatArrive(imu, from, to, options_, &lost_samples_)) {
+         SamplesThatArrive(imu, from, to, options_, lost_samples)) {
       add(i);
     }
     const std::int64_t last_ns = recording_.truth[end - 1].t_ns + padding_ns;
@@ -147,7 +179,7 @@ class Cutter {
 
   const Recording& recording_;
   const SimulationOptions& options_;
-  Random lost_samples_;
+  Random lost_samples_, second_lost_samples_;
   std::vector<int> local_;
   std::size_t next_observation_ = 0;
 };
@@ -179,7 +211,12 @@ SimulatedSession Simulate(const Rig& rig,
   TimeMargins margins = ExposureMargins(
       theta_true, theta_slam, options.session_age_s, trajectory.duration_s());
   margins.after_s += options.exposure_s;
-  recording.truth = TrueKeyframes(trajectory, recording.imu, margins, options);
+  if (theta_true.imu1) {
+    recording.imu1 =
+        SimulateSecondImu(rig, *theta_true.imu1, trajectory, options);
+  }
+  recording.truth = TrueKeyframes(
+      trajectory, recording.imu, recording.imu1, margins, options);
   const int N = options.keyframes_per_segment;
   const int segments = static_cast<int>(recording.truth.size()) / N;
   recording.truth.resize(static_cast<std::size_t>(segments) * N);
@@ -204,6 +241,11 @@ SimulatedSession Simulate(const Rig& rig,
       StatesLater(recording.truth, trajectory, recording.imu, delays_s);
   recording.slam =
       SlamStates(meant, recording.imu, theta_true.imu, theta_slam.imu, options);
+  if (theta_true.imu1) {
+    for (KeyframeState& x : recording.truth) {
+      AddSecondMotion(trajectory, *theta_true.imu1, recording.imu1, &x);
+    }
+  }
   recording.slam_landmarks_G =
       TriangulateLandmarks(theta_slam,
                            SlamExposures(theta_slam,

@@ -82,6 +82,9 @@ struct SimulationOptions {
   double slam_landmark_relative = 0.02;  // of the depth, before triangulation
   Eigen::Vector3d b_a0 = {0.05, -0.08, 0.1};
   Eigen::Vector3d b_g0 = {0.004, -0.003, 0.002};
+  // Those of the second IMU, if the device has one.
+  Eigen::Vector3d second_b_a0 = {-0.06, 0.04, 0.05};
+  Eigen::Vector3d second_b_g0 = {-0.002, 0.005, -0.003};
 };
 
 // Sets what docs/recordings.md measures of the errors of tracks in images:
@@ -105,7 +108,8 @@ struct SimulatedSession {
 // SLAM system uses device_slam, each at the temperature of the session: its
 // landmarks are triangulated with that calibration, and its biases absorb the
 // mean of the resulting errors. Noise, pixel sigma and gravity are those of the
-// rig. Images are exposed later than the time of their keyframe by the true
+// rig. A second IMU is one of device_true, which the SLAM system does not use.
+// Images are exposed later than the time of their keyframe by the true
 // time offset of their camera, and the rows of a rolling shutter one after the
 // other; if the SLAM system assumes other offsets and line delays, its states
 // are those at the middle of its images rather than those of the IMU. A time
@@ -129,6 +133,11 @@ SimulatedSession Simulate(const Rig& rig,
 // the caller perturbs it to get a factory calibration (PerturbCalibration).
 Rig HandheldRig(const std::string& id);
 
+// Adds a second IMU to a rig of HandheldRig: another package, turned by a
+// quarter and a few degrees, some centimetres from the first one, with more
+// noise.
+void AddSecondImu(Rig* rig);
+
 // Errors of a factory calibration.
 struct CalibrationError {
   double focal_relative = 0.02;
@@ -139,11 +148,14 @@ struct CalibrationError {
   double scale = 0.01;
   double misalignment = 0.01;
   double accel_rotation_rad = 0.0174533;
+  // Pose of a second IMU.
+  double imu_rotation_rad = 0.0174533;
+  double imu_position_m = 0.01;
 };
 
 // Returns theta with every block perturbed by exactly the given amount, in a
 // direction drawn from the seed: rotations by the angle about a random axis;
-// p_CI and the principal point by the distance in a random direction; each
+// positions and the principal point by the distance in a random direction; each
 // scale, misalignment and distortion coefficient up or down by the amount, and
 // both focal lengths of a camera together.
 Calibration PerturbCalibration(const Calibration& theta,

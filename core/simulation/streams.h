@@ -18,5 +18,8 @@ inline constexpr std::uint64_t kMovingLandmarkStream = 111;
 inline constexpr std::uint64_t kBlurStream = 112;
 inline constexpr std::uint64_t kPatchStream = 113;
 inline constexpr std::uint64_t kLostSampleStream = 121;
+inline constexpr std::uint64_t kSecondImuNoiseStream = 131;
+inline constexpr std::uint64_t kSecondBiasWalkStream = 132;
+inline constexpr std::uint64_t kSecondLostSampleStream = 133;
 
 }  // namespace selfcal

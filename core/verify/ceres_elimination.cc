@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/model/second_imu.h"
 #include "core/model/temperature.h"
 #include "core/verify/cholmod_elimination.h"
 #include "core/verify/scorer.h"
@@ -47,7 +48,8 @@ Evaluated Evaluate(SegmentProblem* segment) {
               residuals.data(), static_cast<Eigen::Index>(residuals.size()))};
 }
 
-// Root mean squares by kind (rotation, velocity, position, b_a, b_g).
+// Root mean squares by kind (rotation, velocity, position, b_a, b_g) of the
+// links of one IMU.
 std::vector<double> RootMeanSquares(const Eigen::VectorXd& whitened) {
   std::vector<double> rms(kKinds, 0);
   const Eigen::Index links = whitened.size() / kStateTangentSize;
@@ -86,10 +88,12 @@ LinearisedSegment EliminateByCeres(const Rig& of_device,
   const Rig rig = WithoutSlopes(of_device);
   SegmentProblem problem(rig, theta0, segment, selection, gauge_keyframe);
   const Evaluated evaluated = Evaluate(&problem);
+  const Eigen::Index of_imu =
+      kStateTangentSize *
+      (static_cast<Eigen::Index>(segment.keyframes.size()) - 1);
   const Eigen::VectorXd inertial = evaluated.r.segment(
       2 * static_cast<Eigen::Index>(selection.inliers.size()),
-      kStateTangentSize *
-          (static_cast<Eigen::Index>(segment.keyframes.size()) - 1));
+      ImuCount(theta0) * of_imu);
   const std::vector<int> free = FreeComponents(rig);
   const auto size = static_cast<Eigen::Index>(free.size());
   const auto eliminated = EliminateByCholmod(evaluated.J, evaluated.r, size);
@@ -99,7 +103,7 @@ LinearisedSegment EliminateByCeres(const Rig& of_device,
         "the scorer \"structured\"");
   }
   LinearisedSegment result;
-  result.inertial_rms = RootMeanSquares(inertial);
+  result.inertial_rms = RootMeanSquares(inertial.head(of_imu));
   const Eigen::VectorXd prior = PriorSigmas(rig);
   const Eigen::VectorXd unit = prior(free).cwiseInverse();
   // Subtracts the rig's prior, which made it definite.

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "core/factor/ceres_factors.h"
+#include "core/factor/link_batch.h"
 #include "core/information/weak_priors.h"
+#include "core/model/second_imu.h"
 
 namespace selfcal {
 namespace {
@@ -17,7 +19,8 @@ struct Blocks {
   std::vector<double> theta;
   std::vector<Eigen::Vector4d> q;
   std::vector<Eigen::Vector3d> p;
-  std::vector<Eigen::Matrix<double, 9, 1>> vb;
+  // Velocity and biases, of each IMU.
+  std::vector<Eigen::Matrix<double, 9, 1>> vb[kMaxImus];
   std::map<int, Eigen::Vector3d> l;
 };
 
@@ -29,7 +32,8 @@ Blocks MakeBlocks(const Calibration& theta0,
   for (const KeyframeState& x : segment.keyframes) {
     blocks.q.push_back(x.q_GI.coeffs());
     blocks.p.push_back(x.p_GI);
-    blocks.vb.emplace_back() << x.v_GI, x.b_a, x.b_g;
+    blocks.vb[0].emplace_back() << x.v_GI, x.b_a, x.b_g;
+    if (theta0.imu1) blocks.vb[1].emplace_back() << x.v_GJ, x.b_a1, x.b_g1;
   }
   for (const int index : selection.inliers) {
     const int landmark = segment.observations[index].landmark;
@@ -53,7 +57,9 @@ void AddPriors(const Rig& rig, int gauge, Blocks* b, ceres::Problem* problem) {
   motion << Eigen::Vector3d::Constant(kVelocityPriorSigma_mps),
       Eigen::Vector3d::Constant(kAccelBiasPriorSigma_mps2),
       Eigen::Vector3d::Constant(kGyroBiasPriorSigma_radps);
-  AddPrior(motion, b->vb[0].data(), problem);
+  for (auto& vb : b->vb) {
+    if (!vb.empty()) AddPrior(motion, vb[0].data(), problem);
+  }
   for (auto& [id, l] : b->l) {
     AddPrior(
         Eigen::Vector3d::Constant(kLandmarkPriorSigma_m), l.data(), problem);
@@ -63,6 +69,49 @@ void AddPriors(const Rig& rig, int gauge, Blocks* b, ceres::Problem* problem) {
            b->q[gauge].data(),
            problem);
   AddPrior(PriorSigmas(rig), b->theta.data(), problem);
+}
+
+void AddLinks(const Rig& rig,
+              const Calibration& theta0,
+              const MotionSegment& segment,
+              int imu,
+              Blocks* b,
+              ceres::Problem* problem) {
+  const std::span<const ImuSample> samples =
+      imu == 0 ? SamplesFromFirstKeyframe(segment)
+               : SecondSamplesFromFirstKeyframe(segment);
+  const ImuNoise& noise = NoiseOfImu(rig, imu);
+  for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
+    const KeyframeState& x0 = segment.keyframes[k];
+    const KeyframeState& x1 = segment.keyframes[k + 1];
+    InertialMatrix covariance;
+    EvaluateInertial(samples,
+                     StateOfImu(theta0, imu, x0),
+                     StateOfImu(theta0, imu, x1),
+                     ImuOf(theta0, imu),
+                     noise,
+                     rig.gravity_mps2,
+                     nullptr,
+                     &covariance);
+    problem->AddResidualBlock(
+        MakeInertialCost(theta0,
+                         imu,
+                         samples,
+                         x0.t_ns,
+                         x1.t_ns,
+                         noise,
+                         rig.gravity_mps2,
+                         SquareRootInformation(covariance))
+            .release(),
+        nullptr,
+        b->theta.data(),
+        b->q[k].data(),
+        b->p[k].data(),
+        b->vb[imu][k].data(),
+        b->q[k + 1].data(),
+        b->p[k + 1].data(),
+        b->vb[imu][k + 1].data());
+  }
 }
 
 void AddFactors(const Rig& rig,
@@ -88,36 +137,8 @@ void AddFactors(const Rig& rig,
         b->p[o.keyframe].data(),
         b->l.at(o.landmark).data());
   }
-  const std::span<const ImuSample> samples = SamplesFromFirstKeyframe(segment);
-  for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
-    const KeyframeState& x0 = segment.keyframes[k];
-    const KeyframeState& x1 = segment.keyframes[k + 1];
-    InertialMatrix covariance;
-    EvaluateInertial(samples,
-                     x0,
-                     x1,
-                     theta0.imu,
-                     rig.imu_noise,
-                     rig.gravity_mps2,
-                     nullptr,
-                     &covariance);
-    problem->AddResidualBlock(
-        MakeInertialCost(theta0,
-                         samples,
-                         x0.t_ns,
-                         x1.t_ns,
-                         rig.imu_noise,
-                         rig.gravity_mps2,
-                         SquareRootInformation(covariance))
-            .release(),
-        nullptr,
-        b->theta.data(),
-        b->q[k].data(),
-        b->p[k].data(),
-        b->vb[k].data(),
-        b->q[k + 1].data(),
-        b->p[k + 1].data(),
-        b->vb[k + 1].data());
+  for (int imu = 0; imu < ImuCount(theta0); ++imu) {
+    AddLinks(rig, theta0, segment, imu, b, problem);
   }
 }
 
@@ -174,7 +195,9 @@ std::vector<double*> SegmentProblem::BlocksInOrder() {
   for (int k = 0; k < static_cast<int>(b.q.size()); ++k) {
     order.push_back(b.q[k].data());
     if (k != gauge_keyframe_) order.push_back(b.p[k].data());
-    order.push_back(b.vb[k].data());
+    for (auto& vb : b.vb) {
+      if (!vb.empty()) order.push_back(vb[k].data());
+    }
   }
   if (theta_size_ > 0) order.push_back(b.theta.data());
   return order;

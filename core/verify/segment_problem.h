@@ -20,8 +20,8 @@ namespace selfcal {
 // Includes the weak priors of weak_priors.h and the rig's prior of theta, both
 // centred at the linearisation point; the gauge is held constant. The arguments
 // must outlive it. Residual blocks are in this order: reprojections of the
-// inliers (2 rows each), inertial links (15), priors. Theta varies in its free
-// components, in units of the prior.
+// inliers (2 rows each), inertial links of each IMU in turn (15), priors. Theta
+// varies in its free components, in units of the prior.
 class SegmentProblem {
  public:
   SegmentProblem(const Rig& rig,

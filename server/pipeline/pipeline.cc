@@ -191,19 +191,27 @@ class PipelineImpl : public Pipeline {
     if (!stored_rig.ok()) return done(stored_rig.status());
     const Calibration& factory = stored_rig->rig.factory;
     const ImuFullScale& full_scale = stored_rig->rig.imu_full_scale;
+    const ImuFullScale& second_scale = stored_rig->rig.imu1_full_scale;
     const std::size_t stray =
         CountStrayObservations(segment, factory, options_.limits);
-    const std::span<const ImuSample> samples = SamplesBetweenKeyframes(segment);
-    const std::size_t saturated = CountSaturatedReadings(samples, full_scale);
-    if (IsTooSaturated(samples, saturated)) {
-      return done(TooSaturated(samples.size(), saturated));
+    std::size_t saturated = 0;
+    for (const auto& [samples, limit] :
+         {std::pair(SamplesBetweenKeyframes(segment), full_scale),
+          std::pair(SecondSamplesBetweenKeyframes(segment), second_scale)}) {
+      const std::size_t of_imu = CountSaturatedReadings(samples, limit);
+      if (IsTooSaturated(samples, of_imu)) {
+        return done(TooSaturated(samples.size(), of_imu));
+      }
+      saturated += of_imu;
     }
-    if (stray == 0 && CountSaturatedReadings(segment.imu, full_scale) == 0) {
+    if (stray == 0 && CountSaturatedReadings(segment.imu, full_scale) == 0 &&
+        CountSaturatedReadings(segment.imu1, second_scale) == 0) {
       return BeginStore(rig, factory, segment, cancelled, done);
     }
     MotionSegment rest = segment;
     RemoveStrayObservations(factory, options_.limits, &rest);
-    RemoveSaturatedReadings(full_scale, &rest);
+    RemoveSaturatedReadings(full_scale, &rest.imu);
+    RemoveSaturatedReadings(second_scale, &rest.imu1);
     BeginStore(rig,
                factory,
                rest,

@@ -138,6 +138,7 @@ class Stretch {
                      &covariance);
     problem->AddResidualBlock(
         MakeInertialCost(theta_,
+                         0,
                          imu,
                          x0.t_ns,
                          x1.t_ns,

@@ -6,6 +6,7 @@
 #include "core/factor/inertial.h"
 #include "core/factor/reprojection.h"
 #include "core/information/weak_priors.h"
+#include "core/model/second_imu.h"
 
 namespace selfcal {
 namespace {
@@ -33,7 +34,7 @@ class Assembly {
     int column = 3 * static_cast<int>(landmark_columns_.size());
     for (int k = 0; k < static_cast<int>(segment.keyframes.size()); ++k) {
       state_columns_.push_back(column);
-      column += k == gauge ? 11 : 15;
+      column += StateTangentSize(theta0) - (k == gauge ? 4 : 0);
     }
     for (int i = 0; i < theta_scale.size(); ++i) {
       theta_columns_.push_back(theta_scale(i) != 0 ? column++ : -1);
@@ -47,7 +48,9 @@ class Assembly {
       AddObservation(segment_.observations[index]);
     }
     for (std::size_t k = 0; k + 1 < segment_.keyframes.size(); ++k) {
-      AddInertial(static_cast<int>(k));
+      for (int imu = 0; imu < ImuCount(theta0_); ++imu) {
+        AddInertial(static_cast<int>(k), imu);
+      }
     }
     SegmentJacobian result;
     result.J.resize(static_cast<int>(r_.size()), columns_);
@@ -69,7 +72,7 @@ class Assembly {
     }
   }
 
-  // J by the full 15 dimensions of the tangent of keyframe k.
+  // J by the full dimensions of the tangent of keyframe k.
   void AddState(int row, int k, const Eigen::MatrixXd& J) {
     if (k != gauge_) {
       AddBlock(row, state_columns_[k], J);
@@ -78,7 +81,7 @@ class Assembly {
     const Eigen::Matrix3d R_IG =
         segment_.keyframes[k].q_GI.toRotationMatrix().transpose();
     AddBlock(row, state_columns_[k], J.leftCols(3) * R_IG.leftCols(2));
-    AddBlock(row, state_columns_[k] + 2, J.rightCols(9));
+    AddBlock(row, state_columns_[k] + 2, J.rightCols(J.cols() - 6));
   }
 
   void AddTheta(int row, int offset, const Eigen::MatrixXd& J) {
@@ -104,10 +107,13 @@ class Assembly {
       AddPriorOn(column, 3, kLandmarkPriorSigma_m);
     }
     AddPriorOn(state_columns_[gauge_], 2, kTiltPriorSigma_rad);
-    const int motion = state_columns_[0] + (gauge_ == 0 ? 2 : 6);
-    AddPriorOn(motion, 3, kVelocityPriorSigma_mps);
-    AddPriorOn(motion + 3, 3, kAccelBiasPriorSigma_mps2);
-    AddPriorOn(motion + 6, 3, kGyroBiasPriorSigma_radps);
+    for (int imu = 0; imu < ImuCount(theta0_); ++imu) {
+      const int motion =
+          state_columns_[0] + (gauge_ == 0 ? 2 : 6) + imu * kMotionTangentSize;
+      AddPriorOn(motion, 3, kVelocityPriorSigma_mps);
+      AddPriorOn(motion + 3, 3, kAccelBiasPriorSigma_mps2);
+      AddPriorOn(motion + 6, 3, kGyroBiasPriorSigma_radps);
+    }
   }
 
   void AddObservation(const Observation& observation) {
@@ -127,7 +133,7 @@ class Assembly {
     }
     const double w = 1 / rig_.pixel_sigma_px;
     const int row = AddResidual(w * r);
-    Eigen::MatrixXd state = Eigen::MatrixXd::Zero(2, 15);
+    Eigen::MatrixXd state = Eigen::MatrixXd::Zero(2, StateTangentSize(theta0_));
     state.leftCols(6) = w * J.pose;
     AddState(row, observation.keyframe, state);
     AddBlock(row,
@@ -137,23 +143,45 @@ class Assembly {
         row, CameraTangentOffset(theta0_, observation.camera), w * J.camera);
   }
 
-  void AddInertial(int k) {
+  void AddInertial(int k, int imu) {
+    const KeyframeState& x0 = segment_.keyframes[k];
+    const KeyframeState& x1 = segment_.keyframes[k + 1];
     InertialJacobians J;
     InertialMatrix covariance;
     const InertialResidual r =
-        EvaluateInertial(SamplesFromFirstKeyframe(segment_),
-                         segment_.keyframes[k],
-                         segment_.keyframes[k + 1],
-                         theta0_.imu,
-                         rig_.imu_noise,
+        EvaluateInertial(imu == 0 ? SamplesFromFirstKeyframe(segment_)
+                                  : SecondSamplesFromFirstKeyframe(segment_),
+                         StateOfImu(theta0_, imu, x0),
+                         StateOfImu(theta0_, imu, x1),
+                         ImuOf(theta0_, imu),
+                         NoiseOfImu(rig_, imu),
                          rig_.gravity_mps2,
                          &J,
                          &covariance);
     const InertialMatrix W = SquareRootInformation(covariance);
     const int row = AddResidual(W * r);
-    AddState(row, k, W * J.x0);
-    AddState(row, k + 1, W * J.x1);
-    AddTheta(row, 0, W * J.theta);
+    const int first = imu == 0 ? 0 : ImuTangentSize(theta0_.imu);
+    AddTheta(row, first, W * J.theta);
+    AddImuState(row, k, imu, W * J.x0);
+    AddImuState(row, k + 1, imu, W * J.x1);
+  }
+
+  // J by the state of an IMU at keyframe k.
+  void AddImuState(int row, int k, int imu, const Eigen::MatrixXd& J) {
+    Eigen::MatrixXd by_state =
+        Eigen::MatrixXd::Zero(J.rows(), StateTangentSize(theta0_));
+    by_state.middleCols(6 + imu * kMotionTangentSize, kMotionTangentSize) =
+        J.rightCols(kMotionTangentSize);
+    by_state.leftCols(6) = J.leftCols(6);
+    if (imu == 1) {
+      const MountDerivatives at =
+          DerivativesOfMount(*theta0_.imu1, segment_.keyframes[k]);
+      by_state.leftCols(6) = J.leftCols(6) * at.by_pose;
+      AddTheta(row,
+               LinkTangentSize(theta0_) - kMountTangentSize,
+               J.leftCols(6) * at.by_mount);
+    }
+    AddState(row, k, by_state);
   }
 
   const Rig& rig_;

@@ -84,7 +84,7 @@ struct Solved {
 class DenseRound {
  public:
   DenseRound(const Solved& solved,
-             const NoiseVector& factors,
+             const NoiseVector<kNoiseKinds>& factors,
              double track_noise)
       : solved_(solved),
         rig_(solved.rig),
@@ -109,7 +109,7 @@ class DenseRound {
   }
 
   // The squares of pixels are weighted.
-  NoiseBalance Count() const {
+  NoiseBalance<kNoiseKinds> Count() const {
     Eigen::MatrixXd J(Rows(), columns_);
     Eigen::VectorXd r(Rows());
     for (int i = 0; i < Rows(); ++i) {
@@ -125,7 +125,7 @@ class DenseRound {
         qr.householderQ() * Eigen::MatrixXd::Identity(Rows(), J.cols());
     const Eigen::VectorXd left = r - Q * (Q.transpose() * r);
 
-    NoiseBalance balance;
+    NoiseBalance<kNoiseKinds> balance;
     const auto add = [&](NoiseKind kind, double squares, double redundancy) {
       balance.squares[IndexOf(kind)] += squares;
       balance.redundancy[IndexOf(kind)] += redundancy;
@@ -332,14 +332,16 @@ class DenseRound {
 
 void ExpectEqualsDense(const Solved& solved, double track_noise) {
   const SolverRound round = solved.Round();
-  NoiseProblem problem(round, solved.estimate, solved.landmarks, track_noise);
+  NoiseProblem<kNoiseKinds> problem(
+      round, solved.estimate, solved.landmarks, track_noise);
   // Earlier evaluations make no difference.
   for (const double pixel : {0.8, 1.7, 1.0}) {
-    NoiseVector factors(pixel, 1.4, 0.7, 0.6, 2.0);
-    const std::optional<NoiseBalance> balance =
+    NoiseVector<kNoiseKinds> factors(pixel, 1.4, 0.7, 0.6, 2.0);
+    const std::optional<NoiseBalance<kNoiseKinds>> balance =
         problem.Evaluate(factors.array().log());
     ASSERT_TRUE(balance.has_value());
-    const NoiseBalance dense = DenseRound(solved, factors, track_noise).Count();
+    const NoiseBalance<kNoiseKinds> dense =
+        DenseRound(solved, factors, track_noise).Count();
     for (int i = 0; i < kNoiseKinds; ++i) {
       SCOPED_TRACE(NoiseKindName(static_cast<NoiseKind>(i)));
       EXPECT_NEAR(balance->redundancy[i],

@@ -11,6 +11,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/information/segment_information.h"
+#include "core/model/symmetric_eigen.h"
 #include "core/model/temperature.h"
 #include "core/simulation/simulate.h"
 #include "test/core/calibration/simulated_errors.h"
@@ -40,6 +41,86 @@ void ExpectLastIsFound(const Errors& errors, double largest_sigma) {
   std::printf("last: %.2g off, sigma %.2g\n", errors.error(last), sigma);
   EXPECT_LT(std::abs(errors.error(last)), 3.3 * sigma);
   EXPECT_LT(sigma, largest_sigma);
+}
+
+Rig RigOfTwoImus() {
+  Rig rig = HandheldRig("two_imus");
+  AddSecondImu(&rig);
+  return rig;
+}
+
+TEST(TwoImus, AreFoundWithinTheirSigmas) {
+  const Rig rig = RigOfTwoImus();
+  ExpectConsistent(12, [&](std::uint64_t seed) {
+    Rig wrong = rig;
+    wrong.factory = PerturbCalibration(rig.factory, {}, seed);
+    return CalibrateSimulated(wrong, rig.factory, seed);
+  });
+}
+
+TEST(TwoImus, TheSecondOneOnlyAddsInformation) {
+  const Rig two = RigOfTwoImus();
+  Rig one = two;
+  one.factory.imu1.reset();
+  one.groups = DefaultGroups(one.blocks, one.factory);
+  MotionSegment segment =
+      Simulate(two, two.factory, two.factory, *MakeHandheld(4.5, 1, 1), "s", {})
+          .segments.front();
+  // Eliminates its own components, of which the rig knows the prior.
+  Eigen::MatrixXd with = ScoreSegment(two, two.factory, segment).Lambda;
+  with.diagonal() += PriorSigmas(two).cwiseAbs2().cwiseInverse();
+  const auto components = TangentComponents(two.factory);
+  const auto common = MatchComponents(components, {"imu.*", "cam0.*"});
+  const auto second = MatchComponents(components, {"imu1.*"});
+  const Eigen::MatrixXd coupling = with(second, common);
+  Eigen::MatrixXd added =
+      with(common, common) -
+      coupling.transpose() * with(second, second).ldlt().solve(coupling);
+  segment.imu1.clear();
+  Eigen::MatrixXd without = ScoreSegment(one, one.factory, segment).Lambda;
+  const Eigen::VectorXd prior = PriorSigmas(one);
+  without.diagonal() += prior.cwiseAbs2().cwiseInverse();
+  added = prior.asDiagonal() * (added - without) * prior.asDiagonal();
+  without = prior.asDiagonal() * without * prior.asDiagonal();
+  const Eigen::VectorXd eigenvalues = SymmetricEigenvalues(added);
+  EXPECT_GT(eigenvalues.minCoeff(), -1e-9 * without.norm());
+  EXPECT_GT(eigenvalues.maxCoeff(), 1);
+}
+
+// The second IMU is noisier than its rig states; the calibration notices, and
+// weights it by less.
+TEST(TwoImus, TheNoiseOfTheSecondOneIsEstimated) {
+  Rig rig = RigOfTwoImus();
+  SimulationOptions options;
+  options.seed = 3;
+  options.keyframes_per_segment = 30;
+  const std::vector<MotionSegment> segments =
+      Simulate(rig,
+               rig.factory,
+               PerturbCalibration(rig.factory, {}, 3),
+               *MakeHandheld(12.5, 1, 3),
+               "s",
+               options)
+          .segments;
+  rig.imu1_noise.gyro_noise_density /= 4;
+  rig.imu1_noise.accel_noise_density /= 4;
+  const CalibrationResult result = Calibrate(rig, rig.factory, segments);
+  ASSERT_EQ(result.noise_scales.size(),
+            static_cast<std::size_t>(kMaxNoiseKinds));
+  for (const NoiseScale& scale : result.noise_scales) {
+    const bool wrong = scale.kind == NoiseKind::kSecondGyro ||
+                       scale.kind == NoiseKind::kSecondAccel;
+    std::printf("%s: %.2f, used %.2f\n",
+                NoiseKindName(scale.kind).c_str(),
+                scale.factor,
+                scale.used);
+    if (wrong) {
+      EXPECT_LT(std::abs(std::log(scale.factor / 4)), 3.3 * scale.log_sigma);
+      EXPECT_GT(scale.used, 3);
+    } else {
+      EXPECT_LT(std::abs(std::log(scale.factor)), 3.3 * scale.log_sigma);
+    }
+  }
 }
 
 class Cameras : public testing::TestWithParam<int> {};

@@ -264,6 +264,20 @@ TEST(Solvers, AgreeWithFixedComponents) {
   Simple({}, SmallestOptions(4), rig).ExpectSameMinimum();
 }
 
+TEST(Solvers, AgreeOnTwoImusAcrossGaps) {
+  Rig rig = HandheldRig("r");
+  AddSecondImu(&rig);
+  const Calibration truth = rig.factory;
+  rig = WrongRig(rig);
+  std::vector<MotionSegment> segments =
+      Walk(rig, truth, SmallestOptions(13), 5);
+  segments.erase(segments.begin() + 2);
+  Posed posed(rig, truth, segments);
+  EXPECT_EQ(posed.problem().bias_links.size(), 1u);
+  EXPECT_EQ(posed.partitioning().joints.size(), 2u);
+  posed.ExpectSameMinimum();
+}
+
 // Chains of different temperatures, of a device with slopes.
 TEST(Solvers, AgreeOnSlopesWithTemperature) {
   Rig rig = HandheldRig("r");

@@ -42,6 +42,10 @@ std::vector<RandomChainShape> Shapes() {
     shape.found_again = trial % 2 == 0 ? 0 : 0.3;
     shape.kept = trial % 3 == 0 ? 0.3 : 0;
     shape.turned = trial % 4 < 2;
+    if (trial % 4 == 3) {
+      shape.state_size = kMaxChainStateSize;
+      shape.further_rows = trial % 8 == 3 ? kMaxChainLinkRows : 0;
+    }
     shapes.push_back(shape);
   }
   return shapes;
@@ -52,7 +56,7 @@ int FirstLinkRow(const Chain& chain) {
   std::size_t observations = 0;
   for (const auto& track : chain.landmarks) observations += track.size();
   return static_cast<int>(3 * chain.landmarks.size() + 2 * observations) +
-         kChainStateSize * chain.keyframes();
+         chain.state_size * chain.keyframes();
 }
 
 // Calls check(elimination) for every width of this machine.
@@ -106,8 +110,8 @@ TEST(ChainElimination, FindsTheStepsThatMinimise) {
       }
       at *= 3;
       for (const auto& x : states) {
-        actual.segment<kChainStateSize>(at) = x;
-        at += kChainStateSize;
+        actual.segment(at, x.size()) = x;
+        at += x.size();
       }
       EXPECT_LT(RelativeError(actual, expected), 1e-8);
     }
@@ -137,24 +141,25 @@ TEST(ChainElimination, FindsThePosterior) {
           step.tail(D), covariance.bottomRightCorner(D, D), states, &posterior);
       const int first = 3 * static_cast<int>(chain.landmarks.size());
       const int last = chain.keyframes() - 1;
+      const int size = chain.state_size;
+      const int shared = first + size * (last + 1);
       for (int k = 0; k <= last; ++k) {
-        const int at = first + kChainStateSize * k;
+        const int at = first + size * k;
         EXPECT_LT(RelativeError(posterior.state_covariance[k],
-                                covariance.block<15, 15>(at, at)),
+                                covariance.block(at, at, size, size)),
                   1e-8);
       }
-      EXPECT_LT(RelativeError(
-                    posterior.first_with_shared,
-                    covariance.block(first, first + 15 * (last + 1), 15, D)),
+      EXPECT_LT(RelativeError(posterior.first_with_shared,
+                              covariance.block(first, shared, size, D)),
                 1e-8);
       EXPECT_LT(
           RelativeError(posterior.last_with_shared,
-                        covariance.block(
-                            first + 15 * last, first + 15 * (last + 1), 15, D)),
+                        covariance.block(first + size * last, shared, size, D)),
           1e-8);
       for (int k = 0; k < last; ++k) {
-        const auto J = dense.J.middleRows<15>(FirstLinkRow(chain) + 15 * k);
-        const auto r = dense.r.segment<15>(FirstLinkRow(chain) + 15 * k);
+        const Eigen::Index rows = chain.links[k].residual.size();
+        const auto J = dense.J.middleRows(FirstLinkRow(chain) + rows * k, rows);
+        const auto r = dense.r.segment(FirstLinkRow(chain) + rows * k, rows);
         EXPECT_LT(RelativeError(posterior.noise[k], r + J * step), 1e-8);
         EXPECT_LT(RelativeError(posterior.noise_covariance[k],
                                 J * covariance * J.transpose()),
@@ -209,7 +214,7 @@ TEST(ChainElimination, APriorMayCoupleAllUnknownsOfAKeyframe) {
   std::normal_distribution<double> normal;
   Chain chain = RandomChain(RandomChainShape(), &random);
   for (ChainStateMatrix& prior : chain.priors) {
-    ChainStateMatrix root;
+    ChainStateMatrix root(chain.state_size, chain.state_size);
     for (auto& x : root.reshaped()) x = normal(random);
     prior = root.transpose() * root;
   }

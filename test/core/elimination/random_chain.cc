@@ -23,10 +23,10 @@ void FillNormal(std::mt19937* random, Matrix* matrix) {
 }
 
 // Links as those of a motion: neither growing nor shrinking along the chain.
-ChainStateMatrix NearRotation(std::mt19937* random) {
-  ChainStateMatrix A;
+Eigen::MatrixXd NearRotation(int size, std::mt19937* random) {
+  Eigen::MatrixXd A(size, size);
   FillNormal(random, &A);
-  const ChainStateMatrix Q = A.householderQr().householderQ();
+  const Eigen::MatrixXd Q = A.householderQr().householderQ();
   FillNormal(random, &A);
   return 4 * Q + 0.2 * A;
 }
@@ -84,32 +84,57 @@ Eigen::Matrix2Xd ByCamera(const LandmarkRows& rows,
   return J;
 }
 
-// G and A in memory.
+// G, A and H in memory.
 struct Link {
-  ChainTransition View() const { return {columns, G.data(), A.data()}; }
+  using Rows =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  ChainTransition View() const {
+    return {columns, G.data(), A.data(), static_cast<int>(H.rows()), H.data()};
+  }
 
   TransitionColumns columns;
-  Eigen::Matrix<double, kChainStateSize, Eigen::Dynamic, Eigen::RowMajor> G;
-  Eigen::Matrix<double, kChainStateSize, kTransitionNoise, Eigen::RowMajor> A;
+  Rows G, A, H;
 };
 
-Link Solve(const ChainRows& rows) {
+Link Solve(const Chain& chain, const ChainRows& rows) {
+  const int size = chain.state_size;
   // Rows of different kinds differ by many orders: equilibrated before LU.
-  const ChainStateVector scale =
-      rows.x0.rowwise().lpNorm<Eigen::Infinity>().cwiseInverse();
-  const Eigen::PartialPivLU<ChainStateMatrix> lu(scale.asDiagonal() * rows.x0);
+  const Eigen::MatrixXd x0 = rows.x0.topRows(size);
+  const Eigen::VectorXd scale =
+      x0.rowwise().lpNorm<Eigen::Infinity>().cwiseInverse();
+  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(scale.asDiagonal() * x0);
   const auto solve = [&](const auto& columns) {
     return lu.solve(scale.asDiagonal() * columns).eval();
   };
-  const TransitionColumns at(static_cast<int>(rows.shared.cols()));
-  Link link = {at, {}, {}};
-  link.G.setZero(kChainStateSize, at.stride);
-  link.A << solve(ChainStateMatrix::Identity()), ChainStateVector::Zero();
-  link.G.leftCols(at.link_size) = -solve(rows.shared);
-  const ChainStateMatrix next = -solve(rows.x1);
-  link.G.middleCols<9>(at.link_size) = next.rightCols<9>();
-  link.G.col(at.constant) = -solve(rows.residual);
-  link.G.middleCols<6>(at.next_pose) = next.leftCols<6>();
+  const int motion = size - kChainPoseSize;
+  const TransitionColumns at(static_cast<int>(rows.shared.cols()), motion);
+  Link link = {at, {}, {}, {}};
+  // The rows over z, with the sign of a side of an equation.
+  const auto place = [&](double sign,
+                         const Eigen::MatrixXd& shared,
+                         const Eigen::MatrixXd& x1,
+                         const Eigen::VectorXd& residual,
+                         Link::Rows* to) {
+    to->setZero(residual.size(), at.stride);
+    to->leftCols(at.link_size) = sign * shared;
+    to->middleCols(at.link_size, motion) = sign * x1.rightCols(motion);
+    to->col(at.constant) = sign * residual;
+    to->middleCols<6>(at.next_pose) = sign * x1.leftCols<6>();
+  };
+  place(-1,
+        solve(rows.shared.topRows(size)),
+        solve(rows.x1.topRows(size)),
+        solve(rows.residual.head(size)),
+        &link.G);
+  const Eigen::Index further = rows.residual.size() - size;
+  place(1,
+        rows.shared.bottomRows(further),
+        rows.x1.bottomRows(further),
+        rows.residual.tail(further),
+        &link.H);
+  link.A.setZero(size, WholeVectors(size));
+  link.A.leftCols(size) = solve(Eigen::MatrixXd::Identity(size, size));
   return link;
 }
 
@@ -182,17 +207,23 @@ int Chain::shared_size() const {
 Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
   Chain chain;
   chain.link_size = shape.link_size;
+  const int size = chain.state_size = shape.state_size;
   chain.cameras = shape.cameras;
   chain.landmark_prior = 1e-2;
   chain.landmark_prior_slope = {0.01, -0.02, 0.03};
   for (int k = 0; k < shape.keyframes; ++k) {
-    chain.priors.push_back(1e-2 * ChainStateMatrix::Identity());
+    chain.priors.push_back(1e-2 * ChainStateMatrix::Identity(size, size));
     if (k + 1 < shape.keyframes) {
       ChainRows link;
+      const int rows = size + shape.further_rows;
+      link.residual.resize(rows);
       FillNormal(random, &link.residual);
-      link.x0 = NearRotation(random);
-      link.x1 = NearRotation(random);
-      link.shared.resize(kChainStateSize, shape.link_size);
+      link.x0.setZero(rows, size);
+      link.x0.topRows(size) = NearRotation(size, random);
+      link.x1.resize(rows, size);
+      FillNormal(random, &link.x1);
+      link.x1.topRows(size) = NearRotation(size, random);
+      link.shared.resize(rows, shape.link_size);
       FillNormal(random, &link.shared);
       chain.links.push_back(link);
     }
@@ -243,7 +274,8 @@ SharedInformation Eliminate(const Chain& chain,
                       tracks,
                       keyframes,
                       chain.kept,
-                      chain.kept_landmarks},
+                      chain.kept_landmarks,
+                      chain.state_size - kChainPoseSize},
                      record);
   for (int k = 0; k < chain.keyframes(); ++k) {
     for (int camera = 0; camera < static_cast<int>(chain.cameras.size());
@@ -269,7 +301,7 @@ SharedInformation Eliminate(const Chain& chain,
       elimination->AddKeptState(chain.kept_state_at, chain.kept_state);
     }
     if (k + 1 < chain.keyframes()) {
-      elimination->Advance(Solve(chain.links[k]).View());
+      elimination->Advance(Solve(chain, chain.links[k]).View());
     }
   }
   SharedInformation result;
@@ -278,13 +310,16 @@ SharedInformation Eliminate(const Chain& chain,
 }
 
 DenseProblem MakeDense(const Chain& chain) {
+  const int size = chain.state_size;
   const int landmarks = static_cast<int>(chain.landmarks.size());
   const int states = 3 * landmarks;
-  const int shared = states + kChainStateSize * chain.keyframes();
+  const int shared = states + size * chain.keyframes();
   const int columns = shared + chain.shared_size();
   // Rows of zeros below, so that there are never fewer rows than columns.
-  int rows = columns + 12 +
-             kChainStateSize * (static_cast<int>(chain.links.size()) + 1);
+  int rows = columns + 12 + kChainStateSize;
+  for (const ChainRows& link : chain.links) {
+    rows += static_cast<int>(link.residual.size());
+  }
   for (const auto& track : chain.landmarks) {
     rows += 2 * static_cast<int>(track.size());
   }
@@ -306,9 +341,8 @@ DenseProblem MakeDense(const Chain& chain) {
     }
   }
   for (const ChainStateMatrix& prior : chain.priors) {
-    dense.J.block<kChainStateSize, kChainStateSize>(row, row) =
-        prior.llt().matrixU();
-    row += kChainStateSize;
+    dense.J.block(row, row, size, size) = prior.llt().matrixU();
+    row += size;
   }
   std::vector<int> offsets = {shared + chain.link_size};
   for (const LandmarkRows& rows : chain.cameras) {
@@ -317,8 +351,7 @@ DenseProblem MakeDense(const Chain& chain) {
   for (int m = 0; m < landmarks; ++m) {
     for (const ChainObservation& a : chain.landmarks[m]) {
       dense.J.block<2, 3>(row, column(m)) = -a.position;
-      dense.J.block<2, 6>(row, states + kChainStateSize * a.keyframe) =
-          ByPose(a);
+      dense.J.block<2, 6>(row, states + size * a.keyframe) = ByPose(a);
       const LandmarkRows& columns_of = chain.cameras[a.camera];
       dense.J.block(row, offsets[a.camera], 2, columns_of.shared) =
           ByCamera(columns_of, a);
@@ -326,17 +359,19 @@ DenseProblem MakeDense(const Chain& chain) {
       row += 2;
     }
   }
-  for (std::size_t k = 0; k < chain.links.size(); ++k, row += kChainStateSize) {
-    const int at = states + kChainStateSize * static_cast<int>(k);
+  for (std::size_t k = 0; k < chain.links.size(); ++k) {
+    const int at = states + size * static_cast<int>(k);
     const ChainRows& a = chain.links[k];
-    dense.J.block<15, 15>(row, at) = a.x0;
-    dense.J.block<15, 15>(row, at + kChainStateSize) = a.x1;
-    dense.J.block(row, shared, 15, chain.link_size) = a.shared;
-    dense.r.segment<15>(row) = a.residual;
+    const auto of_link = static_cast<int>(a.residual.size());
+    dense.J.block(row, at, of_link, size) = a.x0;
+    dense.J.block(row, at + size, of_link, size) = a.x1;
+    dense.J.block(row, shared, of_link, chain.link_size) = a.shared;
+    dense.r.segment(row, of_link) = a.residual;
+    row += of_link;
   }
   if (chain.kept_bias) {
     const auto add = [&](int keyframe, const KeptBiasRows& rows) {
-      const int at = states + kChainStateSize * keyframe + 9;
+      const int at = states + size * keyframe + 9;
       dense.J.block<6, 6>(row, at) = rows.by_bias.asDiagonal();
       dense.J.block<6, 6>(row, columns - 6) = rows.by_kept.asDiagonal();
       dense.r.segment<6>(row) = rows.residual;
@@ -345,7 +380,7 @@ DenseProblem MakeDense(const Chain& chain) {
     add(0, chain.kept_bias->first);
     add(chain.keyframes() - 1, chain.kept_bias->second);
     const ChainStateVector root = chain.kept_state.cwiseSqrt();
-    const int at = states + kChainStateSize * (chain.keyframes() / 2);
+    const int at = states + size * (chain.keyframes() / 2);
     dense.J.block<15, 15>(row, at) = root.asDiagonal();
     dense.J.block<15, 15>(row, kept + chain.kept_state_at) -=
         root.asDiagonal().toDenseMatrix();

@@ -24,15 +24,16 @@ struct ChainObservation {
       ChainElimination::PoseRotation::Identity();
 };
 
-// Rows between a keyframe and the next.
+// Rows between a keyframe and the next, as many as unknowns of a state; then
+// further ones, whose x0 is zero.
 struct ChainRows {
-  ChainStateVector residual;
-  ChainStateMatrix x0, x1;
-  Eigen::Matrix<double, kChainStateSize, Eigen::Dynamic> shared;
+  Eigen::VectorXd residual;
+  Eigen::MatrixXd x0, x1, shared;
 };
 
 struct Chain {
   int link_size = 0;
+  int state_size = kChainStateSize;
   std::vector<LandmarkRows> cameras;
   std::vector<ChainRows> links;  // one less than keyframes
   std::vector<ChainStateMatrix> priors;
@@ -45,7 +46,8 @@ struct Chain {
   std::vector<int> kept_landmarks;  // first unknown of each, or -1
   int kept = 0;
   int kept_state_at = 0;
-  ChainStateVector kept_state = ChainStateVector::Zero();  // information
+  ChainStateVector kept_state =
+      ChainStateVector::Zero(kChainStateSize);  // information
   std::optional<std::pair<KeptBiasRows, KeptBiasRows>> kept_bias;
 
   int keyframes() const { return static_cast<int>(priors.size()); }
@@ -55,6 +57,8 @@ struct Chain {
 struct RandomChainShape {
   int keyframes = 8;
   int link_size = 15;
+  int state_size = kChainStateSize;
+  int further_rows = 0;  // of each link
   std::vector<LandmarkRows> cameras = {{11}};
   int landmarks_per_keyframe = 4;
   int max_track = 5;  // keyframes from the first to the last that sees it

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "core/factor/ceres_factors.h"
+#include "core/model/second_imu.h"
 #include "core/model/so3.h"
 #include "test/core/factor/cost_function_checks.h"
 #include "test/core/factor/random_values.h"
@@ -15,6 +16,7 @@ constexpr double kGravity = 9.81;
 
 struct Factor {
   Calibration reference;
+  int imu = 0;
   VectorXd delta;  // of theta, from the reference
   std::vector<ImuSample> samples;
   ImuNoise noise;
@@ -23,13 +25,14 @@ struct Factor {
 
   std::unique_ptr<ceres::CostFunction> Cost() const {
     return MakeInertialCost(
-        reference, samples, x0.t_ns, x1.t_ns, noise, kGravity, W);
+        reference, imu, samples, x0.t_ns, x1.t_ns, noise, kGravity, W);
   }
   InertialResidual Plain(InertialMatrix* covariance) const {
+    const Calibration theta = BoxPlus(reference, delta);
     return EvaluateInertial(samples,
-                            x0,
-                            x1,
-                            BoxPlus(reference, delta).imu,
+                            StateOfImu(theta, imu, x0),
+                            StateOfImu(theta, imu, x1),
+                            ImuOf(theta, imu),
                             noise,
                             kGravity,
                             nullptr,
@@ -37,9 +40,13 @@ struct Factor {
   }
 };
 
-VectorXd VelocityAndBiases(const KeyframeState& x) {
+VectorXd VelocityAndBiases(const KeyframeState& x, int imu) {
   VectorXd vb(9);
-  vb << x.v_GI, x.b_a, x.b_g;
+  if (imu == 0) {
+    vb << x.v_GI, x.b_a, x.b_g;
+  } else {
+    vb << x.v_GJ, x.b_a1, x.b_g1;
+  }
   return vb;
 }
 
@@ -47,34 +54,56 @@ Blocks BlocksOf(const Factor& factor) {
   return {factor.delta,
           factor.x0.q_GI.coeffs(),
           factor.x0.p_GI,
-          VelocityAndBiases(factor.x0),
+          VelocityAndBiases(factor.x0, factor.imu),
           factor.x1.q_GI.coeffs(),
           factor.x1.p_GI,
-          VelocityAndBiases(factor.x1)};
+          VelocityAndBiases(factor.x1, factor.imu)};
 }
 
-Factor RandomFactor(RandomValues& random, double duration_s, bool coupled) {
+// A factor of the first IMU; with a second one, of that.
+Factor RandomFactor(RandomValues& random,
+                    double duration_s,
+                    bool coupled,
+                    bool second = false) {
   Factor factor;
   factor.reference.imu = coupled ? random.CoupledImu() : random.Imu();
+  if (second) {
+    factor.imu = 1;
+    factor.reference.imu1 = random.SecondImu(coupled);
+  }
   factor.reference.cameras = {random.Camera(DistortionModel::kFov),
                               random.Camera(DistortionModel::kEquidistant)};
   factor.delta = 0.02 * random.NormalVector(TangentSize(factor.reference));
   // Optional blocks: of the size of their values.
-  const int more = ImuTangentSize(factor.reference.imu) - kImuTangentSize;
-  factor.delta.segment(kImuTangentSize, more) *= 0.1;
-  factor.delta.segment<3>(kAccelRotation) = random.Normal3(0.7);
+  const int size = ImuTangentSize(factor.reference.imu);
+  for (int first = 0; first <= factor.imu * size; first += size) {
+    factor.delta.segment(first + kImuTangentSize, size - kImuTangentSize) *=
+        0.1;
+    factor.delta.segment<3>(first + kAccelRotation) = random.Normal3(0.7);
+  }
   factor.samples = random.Samples(random.LogUniform(100, 1000), duration_s);
   factor.x0 = random.State(0);
   factor.x1 = random.State(static_cast<std::int64_t>(1e9 * duration_s));
+  if (second) {
+    for (KeyframeState* x : {&factor.x0, &factor.x1}) {
+      x->v_GJ = random.Normal3(2);
+      x->b_a1 = random.Normal3(0.2);
+      x->b_g1 = random.Normal3(0.02);
+    }
+  }
   // Rotations that agree to within a radian, away from the jump at pi.
+  const Calibration& theta = factor.reference;
+  const KeyframeState y0 = StateOfImu(theta, factor.imu, factor.x0);
   const Preintegration motion = Preintegrate(factor.samples,
                                              factor.x0.t_ns,
                                              factor.x1.t_ns,
-                                             factor.reference.imu,
-                                             factor.x0.b_a,
-                                             factor.x0.b_g,
+                                             ImuOf(theta, factor.imu),
+                                             y0.b_a,
+                                             y0.b_g,
                                              factor.noise);
-  factor.x1.q_GI = factor.x0.q_GI * motion.Delta_R *
+  Eigen::Quaterniond turn = motion.Delta_R;
+  if (second) turn = theta.imu1->q_JI.conjugate() * turn * theta.imu1->q_JI;
+  factor.x1.q_GI = factor.x0.q_GI * turn *
                    Exp(random.Uniform(0, 1) * random.Normal3(1).normalized());
   InertialMatrix covariance;
   factor.Plain(&covariance);
@@ -85,7 +114,8 @@ Factor RandomFactor(RandomValues& random, double duration_s, bool coupled) {
 TEST(InertialCost, IsThePlainFactorWhitened) {
   RandomValues random(1);
   for (int trial = 0; trial < 500; ++trial) {
-    const Factor factor = RandomFactor(random, 0.1, trial % 2 == 1);
+    const Factor factor =
+        RandomFactor(random, 0.1, trial % 2 == 1, trial % 4 > 1);
     const VectorXd expected = factor.W * factor.Plain(nullptr);
     const VectorXd residuals =
         EvaluateCost(*factor.Cost(), BlocksOf(factor), false).residuals;
@@ -98,8 +128,8 @@ TEST(InertialCost, JacobiansMatchDifferencesThroughBothManifolds) {
   const auto full = MakeRotationManifold();
   const auto gauge = MakeGaugeRotationManifold();
   for (int trial = 0; trial < 300; ++trial) {
-    const Factor factor =
-        RandomFactor(random, trial % 20 == 0 ? 1 : 0.1, trial % 3 == 0);
+    const Factor factor = RandomFactor(
+        random, trial % 20 == 0 ? 1 : 0.1, trial % 3 == 0, trial % 4 > 1);
     const auto* manifold = trial % 2 == 0 ? full.get() : gauge.get();
     const auto cost = factor.Cost();
     // Whitened residuals reach 1e5 and more, and carry their rounding along.

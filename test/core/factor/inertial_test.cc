@@ -54,7 +54,7 @@ Factor RandomFactor(RandomValues& random,
 }
 
 ImuCalibration MovedImu(const ImuCalibration& imu, const VectorXd& delta) {
-  return BoxPlus(Calibration{imu, {}}, delta).imu;
+  return BoxPlus(Calibration{.imu = imu, .cameras = {}}, delta).imu;
 }
 
 void ExpectJacobiansMatch(const Factor& factor) {

@@ -229,7 +229,8 @@ TEST(Preintegrate, JacobiansMatchDifferencesOfTheScheme) {
     };
     const auto by_theta = [&](const VectorXd& delta) -> VectorXd {
       Integral moved = integral;
-      moved.imu = BoxPlus(Calibration{integral.imu, {}}, delta).imu;
+      moved.imu =
+          BoxPlus(Calibration{.imu = integral.imu, .cameras = {}}, delta).imu;
       return Difference(moved.MotionAlone(), motion);
     };
     EXPECT_LT(

@@ -61,6 +61,14 @@ class RandomValues {
     return imu;
   }
 
+  SecondImuCalibration SecondImu(bool coupled) {
+    SecondImuCalibration imu;
+    static_cast<ImuCalibration&>(imu) = coupled ? CoupledImu() : Imu();
+    imu.q_JI = Rotation();
+    imu.p_JI = Normal3(0.1);
+    return imu;
+  }
+
   CameraCalibration Camera(DistortionModel model) {
     CameraCalibration camera;
     camera.q_CI = Rotation();

@@ -84,7 +84,8 @@ VectorXd ResidualAt(const View& view,
     VectorXd theta_delta(kImuTangentSize + delta.size());
     theta_delta << VectorXd::Zero(kImuTangentSize), delta;
     moved.camera =
-        BoxPlus(Calibration{{}, {view.camera}}, theta_delta).cameras.front();
+        BoxPlus(Calibration{.imu = {}, .cameras = {view.camera}}, theta_delta)
+            .cameras.front();
   } else {
     moved.landmark_G += delta;
   }

@@ -8,6 +8,7 @@
 #include "core/information/linearisation.h"
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
+#include "core/model/second_imu.h"
 #include "test/core/information/test_segments.h"
 #include "test/reference/ceres_segment.h"
 #include "test/reference/segment_jacobian.h"
@@ -74,6 +75,22 @@ std::vector<Case> WellConditionedCases() {
     c.theta0 = PerturbCalibration(c.rig.factory, {}, seed);
     c.segment =
         OneSegment(c.rig, c.theta0, *MakeHandheld(4.1, 1, seed), options).slam;
+    cases.push_back(c);
+  }
+  for (std::uint64_t seed = 11; seed <= 12; ++seed) {
+    // Two IMUs, at the truth and off it.
+    Case c;
+    c.rig = HandheldRig("handheld");
+    AddSecondImu(&c.rig);
+    c.theta0 = c.rig.factory;
+    if (seed > 11) c.theta0 = PerturbCalibration(c.rig.factory, {}, seed);
+    SimulationOptions options;
+    options.seed = seed;
+    options.keyframes_per_segment = 20;
+    c.segment =
+        OneSegment(c.rig, c.theta0, *MakeHandheld(2.2, 1, seed), options).slam;
+    StartSecondImu(c.theta0, &c.segment);
+    c.gauge = static_cast<int>(seed) - 11;
     cases.push_back(c);
   }
   // Some parameters held by the rig.

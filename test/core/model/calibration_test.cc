@@ -149,6 +149,38 @@ TEST(Calibration, ABlockThatACameraLacksHasNoComponents) {
   EXPECT_EQ(violations[0].field, "cameras[1].line_delay_s");
 }
 
+TEST(Calibration, ASecondImuFollowsTheFirst) {
+  RandomValues random(15);
+  const Calibration theta = random.ThetaOfTwoImus();
+  Calibration without = theta;
+  without.imu1.reset();
+  EXPECT_FALSE(SameShape(theta, without));
+  const int first = ImuTangentSize(theta.imu);
+  const int size = kImuTangentSize + 9 + 3 + 6;
+  EXPECT_EQ(TangentSize(theta), TangentSize(without) + size);
+  EXPECT_EQ(LinkTangentSize(theta), first + size);
+  EXPECT_EQ(CameraTangentOffset(theta, 0), first + size);
+  const auto components = TangentComponents(theta);
+  EXPECT_EQ(components[first].name, "imu1.gyro.scale.x");
+  EXPECT_EQ(components[first + size - 6].name, "imu1.q_JI.x");
+  EXPECT_EQ(components[first + size - 1].name, "imu1.p_JI.z");
+  EXPECT_EQ(components[first + size - 1].unit, "m");
+  const Eigen::VectorXd delta = random.Vector(TangentSize(theta), 0.1);
+  const Calibration moved = BoxPlus(theta, delta);
+  EXPECT_LT((BoxMinus(moved, theta) - delta).norm(), 1e-12);
+  EXPECT_LT(
+      (moved.imu1->p_JI - theta.imu1->p_JI - delta.segment<3>(first + size - 3))
+          .norm(),
+      1e-15);
+  Calibration broken = theta;
+  broken.imu1->q_JI.coeffs() *= 2;
+  broken.imu1->s_a.x() = -1;
+  const auto violations = Validate(broken, "factory");
+  ASSERT_EQ(violations.size(), 2u);
+  EXPECT_EQ(violations[0].field, "factory.imu1.s_a");
+  EXPECT_EQ(violations[1].field, "factory.imu1.q_JI");
+}
+
 TEST(OptionalBlocks, TheDriftOfAClockFollowsALineDelay) {
   RandomValues random(14);
   Calibration theta = random.Theta();

@@ -89,7 +89,7 @@ TEST(ImuPresets, TheLastReadingOfARangeIsSaturated) {
     };
     EXPECT_EQ(CountSaturatedReadings(segment.imu, full_scale), 2u)
         << sensor.name;
-    RemoveSaturatedReadings(full_scale, &segment);
+    RemoveSaturatedReadings(full_scale, &segment.imu);
     EXPECT_EQ(segment.imu.front().t_ns, 2) << sensor.name;
   }
 }

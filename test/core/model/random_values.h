@@ -85,6 +85,22 @@ class RandomValues {
     return theta;
   }
 
+  // The same with a second IMU, which has optional blocks.
+  Calibration ThetaOfTwoImus() {
+    Calibration theta = Theta();
+    SecondImuCalibration& imu = theta.imu1.emplace();
+    imu.s_g += Vector(3, 0.02);
+    imu.m_g = Vector(3, 0.02);
+    imu.s_a += Vector(3, 0.05);
+    imu.m_a = Vector(3, 0.05);
+    imu.q_AI = Rotation();
+    imu.gyro_g_sensitivity = Vector(9, 1e-3);
+    imu.accel_position = Vector(3, 0.05);
+    imu.q_JI = Rotation();
+    imu.p_JI = Vector(3, 0.1);
+    return theta;
+  }
+
  private:
   std::mt19937 engine_;
 };

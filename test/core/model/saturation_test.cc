@@ -32,7 +32,7 @@ TEST(Saturation, ReadingsAtOrBeyondTheFullScaleAreRemoved) {
   segment.imu[70].gyro.x() = 9.999;
   segment.imu[71].accel.x() = -49.999;
   EXPECT_EQ(CountSaturatedReadings(segment.imu, full_scale), 2u);
-  RemoveSaturatedReadings(full_scale, &segment);
+  RemoveSaturatedReadings(full_scale, &segment.imu);
   ASSERT_EQ(segment.imu.size(), 98u);
   EXPECT_EQ(CountSaturatedReadings(segment.imu, full_scale), 0u);
   EXPECT_EQ(segment.imu[3].t_ns, 4);

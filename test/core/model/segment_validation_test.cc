@@ -280,6 +280,29 @@ TEST(ValidateSegment, ClocksThatDriftNeedTheBeginOfTheSession) {
   expect("out of range");
 }
 
+TEST(ValidateSegment, ASecondImuNeedsSamplesAndOnlyThatMayHaveThem) {
+  Calibration theta = Theta();
+  MotionSegment segment = ValidSegment();
+  segment.imu1 = segment.imu;
+  std::vector<Violation> violations = Validate(segment, theta);
+  ASSERT_EQ(violations.size(), 1u);
+  EXPECT_EQ(violations[0].field, "imu1");
+  EXPECT_THAT(violations[0].message, HasSubstr("the rig has no second IMU"));
+  theta.imu1.emplace();
+  EXPECT_TRUE(Validate(segment, theta).empty());
+  segment.imu1[3].accel.y() = kNan;
+  segment.imu1.pop_back();
+  while (segment.imu1.back().t_ns >= segment.keyframes.back().t_ns) {
+    segment.imu1.pop_back();
+  }
+  EXPECT_THAT(Fields(Validate(segment, theta)),
+              ElementsAre("imu1[3].accel",
+                          "imu1[" + std::to_string(segment.imu1.size() - 1) +
+                              "].t_ns"));
+  segment.imu1.clear();
+  EXPECT_THAT(Fields(Validate(segment, theta)), ElementsAre("imu1"));
+}
+
 TEST(ValidateSegment, GapsAreLimited) {
   MotionSegment segment = ValidSegment();
   SegmentLimits limits;

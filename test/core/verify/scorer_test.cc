@@ -106,6 +106,25 @@ TEST(Scorers, AgreeOnSlopesWithTemperature) {
              OneSegment(rig, theta0, *MakeHandheld(4.1, 1, 3), options).slam);
 }
 
+TEST(Scorers, AgreeOnTwoImus) {
+  Rig rig = HandheldRig("handheld");
+  AddSecondImu(&rig);
+  rig.fixed = {"imu1.q_JI.y"};
+  std::mt19937 random(2);
+  for (const MotionKind kind :
+       {MotionKind::kRest, MotionKind::kOneAxis, MotionKind::kHandheld}) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    const Calibration theta0 = PerturbCalibration(rig.factory, {}, 3);
+    SimulationOptions options;
+    options.seed = 3;
+    ExpectSame(
+        rig,
+        theta0,
+        OneSegment(rig, theta0, *RandomMotion(kind, 4.1, &random), options)
+            .slam);
+  }
+}
+
 TEST(Scorers, AgreeWhereNothingIsEstimated) {
   Rig rig = HandheldRig("handheld");
   rig.fixed = {"*"};
