@@ -275,6 +275,7 @@ void ReadCamera(const v1::CameraCalibration& message,
 v1::CalibrationParameters ToProto(const Calibration& theta) {
   v1::CalibrationParameters message;
   FillSensor(theta.imu, message.mutable_imu());
+  if (theta.imu1) FillSensor(*theta.imu1, message.mutable_imu1());
   for (const CameraCalibration& camera : theta.cameras) {
     v1::CameraCalibration* added = message.add_cameras();
     FillSensor(camera, added);
@@ -295,8 +296,23 @@ Violations FromProto(const v1::CalibrationParameters& message,
   Calibration read;
   if (message.has_imu()) {
     ReadSensor(message.imu(), prefix + "imu.", &read.imu, &violations);
+    for (const auto& [present, field] :
+         {std::pair(message.imu().has_q_ji(), "imu.q_ji"),
+          std::pair(message.imu().has_p_ji(), "imu.p_ji")}) {
+      if (!present) continue;
+      violations.push_back(
+          {prefix + field,
+           "is the pose of a second IMU; the first one defines the frame I and "
+           "has none"});
+    }
   } else {
     Require(false, prefix + "imu", &violations);
+  }
+  if (message.has_imu1()) {
+    ReadSensor(
+        message.imu1(), prefix + "imu1.", &read.imu1.emplace(), &violations);
+    Require(message.imu1().has_q_ji(), prefix + "imu1.q_ji", &violations);
+    Require(message.imu1().has_p_ji(), prefix + "imu1.p_ji", &violations);
   }
   read.cameras.resize(message.cameras_size());
   for (int i = 0; i < message.cameras_size(); ++i) {

@@ -110,6 +110,47 @@ bool ReadSelection(const v1::Rig& message, Selection* selection) {
   }
 }
 
+void ReadFullScale(const v1::ImuFullScale& message, ImuFullScale* full_scale) {
+  if (message.gyro_max() != 0) full_scale->gyro_radps = message.gyro_max();
+  if (message.accel_max() != 0) full_scale->accel_mps2 = message.accel_max();
+}
+
+void Fill(const ImuNoise& noise, v1::ImuNoise* message) {
+  message->set_gyro_noise_density(noise.gyro_noise_density);
+  message->set_accel_noise_density(noise.accel_noise_density);
+  message->set_gyro_bias_random_walk(noise.gyro_bias_random_walk);
+  message->set_accel_bias_random_walk(noise.accel_bias_random_walk);
+}
+
+void Fill(const ImuFullScale& full_scale, v1::ImuFullScale* message) {
+  message->set_gyro_max(full_scale.gyro_radps);
+  message->set_accel_max(full_scale.accel_mps2);
+}
+
+// Reads the noise of the second IMU, which a rig with one must state, and no
+// other may.
+void ReadSecondImu(const v1::Rig& message,
+                   const std::string& prefix,
+                   Rig* rig,
+                   std::vector<Violation>* violations) {
+  if (rig->factory.imu1) {
+    if (message.has_imu1_noise()) {
+      rig->imu1_noise = Value(message.imu1_noise());
+    } else {
+      violations->push_back({prefix + "imu1_noise", "is missing"});
+    }
+    return;
+  }
+  for (const auto& [present, field] :
+       {std::pair(message.has_imu1_noise(), "imu1_noise"),
+        std::pair(message.has_imu1(), "imu1")}) {
+    if (!present) continue;
+    violations->push_back(
+        {prefix + field,
+         "is that of a second IMU, which factory.imu1 of this rig lacks"});
+  }
+}
+
 // Reads the settings. The default is stated by 0 or, if 0 has a meaning, by an
 // absent field.
 void ReadSettings(const v1::Rig& message, Rig* rig) {
@@ -117,12 +158,8 @@ void ReadSettings(const v1::Rig& message, Rig* rig) {
   if (message.gravity_mps2() != 0) rig->gravity_mps2 = message.gravity_mps2();
   if (message.table_size() != 0) rig->table_size = message.table_size();
   rig->reweight_noise = message.reweight_noise();
-  if (message.imu().gyro_max() != 0) {
-    rig->imu_full_scale.gyro_radps = message.imu().gyro_max();
-  }
-  if (message.imu().accel_max() != 0) {
-    rig->imu_full_scale.accel_mps2 = message.imu().accel_max();
-  }
+  ReadFullScale(message.imu(), &rig->imu_full_scale);
+  ReadFullScale(message.imu1(), &rig->imu1_full_scale);
   if (message.has_min_gain_nats()) rig->min_gain_nats = message.min_gain_nats();
   if (message.has_retrigger_fraction()) {
     rig->retrigger_fraction = message.retrigger_fraction();
@@ -135,13 +172,12 @@ v1::Rig ToProto(const Rig& rig) {
   v1::Rig message;
   message.set_name(RigName(rig.id));
   *message.mutable_factory() = ToProto(rig.factory);
-  v1::ImuNoise* noise = message.mutable_imu_noise();
-  noise->set_gyro_noise_density(rig.imu_noise.gyro_noise_density);
-  noise->set_accel_noise_density(rig.imu_noise.accel_noise_density);
-  noise->set_gyro_bias_random_walk(rig.imu_noise.gyro_bias_random_walk);
-  noise->set_accel_bias_random_walk(rig.imu_noise.accel_bias_random_walk);
-  message.mutable_imu()->set_gyro_max(rig.imu_full_scale.gyro_radps);
-  message.mutable_imu()->set_accel_max(rig.imu_full_scale.accel_mps2);
+  Fill(rig.imu_noise, message.mutable_imu_noise());
+  Fill(rig.imu_full_scale, message.mutable_imu());
+  if (rig.factory.imu1) {
+    Fill(rig.imu1_noise, message.mutable_imu1_noise());
+    Fill(rig.imu1_full_scale, message.mutable_imu1());
+  }
   message.set_pixel_sigma_px(rig.pixel_sigma_px);
   message.set_gravity_mps2(rig.gravity_mps2);
   for (const ParameterGroup& group : rig.groups) {
@@ -197,6 +233,7 @@ std::vector<Violation> FromProto(const v1::Rig& message,
   } else {
     violations.push_back({prefix + "imu_noise", "is missing"});
   }
+  ReadSecondImu(message, prefix, &read, &violations);
   if (!ReadSelection(message, &read.selection)) {
     violations.push_back(
         {prefix + "selection",

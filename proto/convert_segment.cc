@@ -74,12 +74,12 @@ void ReadKeyframes(const v1::MotionSegment::Keyframes& message,
   if (!columns.ok()) return;
   keyframes->reserve(n);
   for (int k = 0; k < n; ++k) {
-    keyframes->push_back({message.t_ns(k),
-                          QuaternionAt(message.q_gi(), k),
-                          Vector3At(message.p_gi(), k),
-                          Vector3At(message.v_gi(), k),
-                          Vector3At(message.b_a(), k),
-                          Vector3At(message.b_g(), k)});
+    keyframes->push_back({.t_ns = message.t_ns(k),
+                          .q_GI = QuaternionAt(message.q_gi(), k),
+                          .p_GI = Vector3At(message.p_gi(), k),
+                          .v_GI = Vector3At(message.v_gi(), k),
+                          .b_a = Vector3At(message.b_a(), k),
+                          .b_g = Vector3At(message.b_g(), k)});
   }
 }
 
@@ -145,6 +145,15 @@ void FillKeyframes(const std::vector<KeyframeState>& keyframes,
   }
 }
 
+void FillImu(const std::vector<ImuSample>& samples,
+             v1::MotionSegment::ImuSamples* message) {
+  for (const ImuSample& sample : samples) {
+    message->add_t_ns(sample.t_ns);
+    Append(sample.gyro, message->mutable_gyro());
+    Append(sample.accel, message->mutable_accel());
+  }
+}
+
 void FillObservations(const std::vector<Observation>& observations,
                       v1::MotionSegment::Observations* message) {
   for (const Observation& observation : observations) {
@@ -164,12 +173,8 @@ v1::MotionSegment ToProto(const MotionSegment& segment) {
   message.set_index(segment.key.index);
   message.set_calibration_version(segment.calibration_version);
   FillKeyframes(segment.keyframes, message.mutable_keyframes());
-  auto* imu = message.mutable_imu();
-  for (const ImuSample& sample : segment.imu) {
-    imu->add_t_ns(sample.t_ns);
-    Append(sample.gyro, imu->mutable_gyro());
-    Append(sample.accel, imu->mutable_accel());
-  }
+  FillImu(segment.imu, message.mutable_imu());
+  if (!segment.imu1.empty()) FillImu(segment.imu1, message.mutable_imu1());
   auto* landmarks = message.mutable_landmarks();
   for (const Landmark& landmark : segment.landmarks) {
     landmarks->add_id(landmark.id);
@@ -206,6 +211,7 @@ std::vector<Violation> FromProto(const v1::MotionSegment& message,
   ReadKeyframes(
       message.keyframes(), prefix + "keyframes.", &read.keyframes, &violations);
   ReadImu(message.imu(), prefix + "imu.", &read.imu, &violations);
+  ReadImu(message.imu1(), prefix + "imu1.", &read.imu1, &violations);
   ReadLandmarks(
       message.landmarks(), prefix + "landmarks.", &read.landmarks, &violations);
   ReadObservations(message.observations(),

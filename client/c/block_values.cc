@@ -51,6 +51,7 @@ absl::Status SetBlock(const std::string& name,
     };
   };
   VisitWithSlopes(set_of("imu"), theta->imu);
+  if (theta->imu1) VisitWithSlopes(set_of("imu1"), *theta->imu1);
   for (std::size_t j = 0; j < theta->cameras.size(); ++j) {
     VisitWithSlopes(set_of(fmt::format("cam{}", j)), theta->cameras[j]);
   }

@@ -49,6 +49,26 @@ void AddPolicy(const v1::Rig& rig, Facts* facts) {
   }
 }
 
+void AddImu(const std::string& which,
+            const v1::ImuNoise& noise,
+            const v1::ImuFullScale& full_scale,
+            Facts* facts) {
+  facts->Add(which + "gyro noise",
+             fmt::format("{:g} rad/s/sqrt(Hz)", noise.gyro_noise_density()));
+  facts->Add(which + "accel noise",
+             fmt::format("{:g} m/s^2/sqrt(Hz)", noise.accel_noise_density()));
+  facts->Add(
+      which + "gyro bias walk",
+      fmt::format("{:g} rad/s^2/sqrt(Hz)", noise.gyro_bias_random_walk()));
+  facts->Add(
+      which + "accel bias walk",
+      fmt::format("{:g} m/s^3/sqrt(Hz)", noise.accel_bias_random_walk()));
+  facts->Add(which + "gyro full scale",
+             fmt::format("{:g} rad/s", full_scale.gyro_max()));
+  facts->Add(which + "accel full scale",
+             fmt::format("{:g} m/s^2", full_scale.accel_max()));
+}
+
 Facts Describe(const v1::Rig& rig) {
   Facts facts;
   facts.Add("rig", LastPart(rig.name()));
@@ -56,19 +76,10 @@ Facts Describe(const v1::Rig& rig) {
   for (const auto& camera : rig.factory().cameras()) {
     facts.Add("camera", CameraText(camera));
   }
-  const v1::ImuNoise& noise = rig.imu_noise();
-  facts.Add("gyro noise",
-            fmt::format("{:g} rad/s/sqrt(Hz)", noise.gyro_noise_density()));
-  facts.Add("accel noise",
-            fmt::format("{:g} m/s^2/sqrt(Hz)", noise.accel_noise_density()));
-  facts.Add(
-      "gyro bias walk",
-      fmt::format("{:g} rad/s^2/sqrt(Hz)", noise.gyro_bias_random_walk()));
-  facts.Add("accel bias walk",
-            fmt::format("{:g} m/s^3/sqrt(Hz)", noise.accel_bias_random_walk()));
-  facts.Add("gyro full scale", fmt::format("{:g} rad/s", rig.imu().gyro_max()));
-  facts.Add("accel full scale",
-            fmt::format("{:g} m/s^2", rig.imu().accel_max()));
+  AddImu("", rig.imu_noise(), rig.imu(), &facts);
+  if (rig.factory().has_imu1()) {
+    AddImu("second ", rig.imu1_noise(), rig.imu1(), &facts);
+  }
   facts.Add("pixel sigma", fmt::format("{:g} px", rig.pixel_sigma_px()));
   facts.Add("gravity", fmt::format("{:g} m/s^2", rig.gravity_mps2()));
   for (const auto& group : rig.groups()) {

@@ -62,6 +62,7 @@ ChainFiles ReadChainFiles(const std::vector<TextFile>& files) {
   for (const TextFile& file : files) {
     const YAML::Node root = ParseYaml(file);
     const bool cameras = Has(root, "cam0");
+    if (!cameras && Has(root, "imu1")) result.several_imus = true;
     (cameras ? result.cameras : result.imu)
         .reset(!cameras && Has(root, "imu0") ? root["imu0"] : root);
   }

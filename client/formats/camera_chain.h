@@ -16,7 +16,8 @@ namespace selfcal::client {
 // FormatError unless both are given.
 struct ChainFiles {
   YAML::Node cameras;
-  YAML::Node imu;  // the node imu0, or the whole file
+  YAML::Node imu;             // the node imu0, or the whole file
+  bool several_imus = false;  // the file has imu1 as well
 };
 ChainFiles ReadChainFiles(const std::vector<TextFile>& files);
 

@@ -128,6 +128,13 @@ absl::StatusOr<ExportedFiles> ExportRig(const std::string& format,
     const double reference_c = theta.reference_temperature_c;
     ExportedFiles result = (*found)->write(
         rig, WithPositiveFov(AtTemperature(theta, reference_c)), options);
+    if (theta.imu1) {
+      result.losses.push_back(
+          {"imu1",
+           fmt::format("these files of {} have one IMU, the first: omitted",
+                       format),
+           true});
+    }
     if (HasSlopes(theta)) {
       result.losses.push_back(
           {"slopes",

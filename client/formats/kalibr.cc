@@ -113,6 +113,13 @@ ImportedRig ImportKalibr(const std::vector<TextFile>& files,
   const ChainFiles chain = ReadChainFiles(files);
   ImportedRig result;
   CheckReference(chain.imu);
+  if (chain.several_imus) {
+    result.losses.push_back(
+        {"imu1",
+         "the file has several IMUs, of which the first is read: state the "
+         "second one in a file of the rig (factory.imu1, imu1_noise)",
+         true});
+  }
   result.rig.imu_noise = ReadChainNoise(chain.imu);
   const ImuInBody body = FromMatrices(ReadMatrices(chain.imu, &result.losses));
   result.rig.factory.imu = body.imu;

@@ -217,6 +217,7 @@ MotionSegment Assemble(const ClosedSegment& closed,
   segment.session_start_ns = closed.session_start_ns;
   segment.keyframes = StatesAtImages(closed);
   segment.imu = ImuBetween(closed.imu, closed.begin_ns, closed.end_ns);
+  segment.imu1 = ImuBetween(closed.imu1, closed.begin_ns, closed.end_ns);
   const KeyframeSightings sightings = WithoutDuplicates(closed.keyframes);
   Landmarks landmarks(sightings, closed.min_observations);
   landmarks.CompletePositions(

@@ -47,6 +47,7 @@ struct ClosedSegment {
   std::vector<ObservedKeyframe> keyframes;  // at least one, in order of time
   // Strictly increasing in time; samples far outside the segment are excluded.
   std::vector<ImuSample> imu;
+  std::vector<ImuSample> imu1 = {};  // of the second IMU, if there is one
   // Times from and to which the samples are part of the segment.
   std::int64_t begin_ns = 0;
   std::int64_t end_ns = 0;

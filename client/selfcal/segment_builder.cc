@@ -49,9 +49,20 @@ bool Before(const ImuSample& sample, std::int64_t t_ns) {
   return sample.t_ns < t_ns;
 }
 
+// Returns the last sample at or before the time, or else the first sample.
+std::vector<ImuSample>::const_iterator SampleBefore(
+    const std::vector<ImuSample>& samples, std::int64_t t_ns) {
+  const auto first =
+      std::lower_bound(samples.begin(), samples.end(), t_ns, Before);
+  const bool at = first != samples.end() && first->t_ns == t_ns;
+  return first == samples.begin() || at ? first : first - 1;
+}
+
 }  // namespace
 
 struct SegmentBuilder::State {
+  using Samples = std::vector<ImuSample>;
+
   SegmentBuilderOptions options;
   std::uint64_t max_gap_ns;
   std::uint64_t seconds_ns;
@@ -65,6 +76,9 @@ struct SegmentBuilder::State {
   std::vector<PendingKeyframe> keyframes;
   // Samples from padding_ns before the first keyframe on.
   std::vector<ImuSample> imu;
+  // The same of the second IMU, if one was added.
+  std::vector<ImuSample> imu1;
+  bool has_second_imu = false;
   // Time of the last sample of the newest segment, and of the keyframe that
   // followed it when it was closed.
   std::optional<std::int64_t> reach_ns;
@@ -123,14 +137,10 @@ struct SegmentBuilder::State {
   }
 
   bool ImuReaches(std::int64_t t_ns) const {
-    return !imu.empty() && imu.back().t_ns >= t_ns;
-  }
-
-  // Returns the last sample at or before the time, or else the first sample.
-  std::vector<ImuSample>::iterator SampleBefore(std::int64_t t_ns) {
-    const auto first = std::lower_bound(imu.begin(), imu.end(), t_ns, Before);
-    const bool at = first != imu.end() && first->t_ns == t_ns;
-    return first == imu.begin() || at ? first : first - 1;
+    const auto reaches = [&](const std::vector<ImuSample>& samples) {
+      return !samples.empty() && samples.back().t_ns >= t_ns;
+    };
+    return reaches(imu) && (!has_second_imu || reaches(imu1));
   }
 
   // True if the newest segment has samples up to the first keyframe, which did
@@ -170,8 +180,9 @@ struct SegmentBuilder::State {
     segment.pixel_sigma_px = options.pixel_sigma_px;
     segment.gravity_mps2 = options.gravity_mps2;
     segment.keyframes.reserve(size);
-    std::vector<ImuSample> next_imu;
+    Samples next_imu, next_imu1;
     next_imu.reserve(imu.size() + imu.size() / 8);
+    next_imu1.reserve(imu1.size() + imu1.size() / 8);
     closed.push_back(std::move(segment));
 
     const auto middle = keyframes.begin() + static_cast<std::ptrdiff_t>(size);
@@ -182,10 +193,11 @@ struct SegmentBuilder::State {
     const std::int64_t next_begin_ns =
         keyframes.empty() ? end_ns
                           : std::min(end_ns, keyframes.front().begin_ns());
-    next_imu.insert(next_imu.end(),
-                    SampleBefore(Earlier(next_begin_ns, padding_ns)),
-                    imu.end());
+    const std::int64_t from_ns = Earlier(next_begin_ns, padding_ns);
+    next_imu.assign(SampleBefore(imu, from_ns), imu.cend());
+    next_imu1.assign(SampleBefore(imu1, from_ns), imu1.cend());
     closed.back().imu = std::exchange(imu, std::move(next_imu));
+    closed.back().imu1 = std::exchange(imu1, std::move(next_imu1));
     const std::vector<ImuSample>& sent = closed.back().imu;
     const auto last =
         std::lower_bound(sent.begin(), sent.end(), end_ns, Before);
@@ -198,12 +210,15 @@ struct SegmentBuilder::State {
 
   // Drops keyframes before the first sample, which no later sample can cover.
   void DropUncovered() {
-    if (imu.empty()) return;
-    const auto first =
-        std::find_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {
-          return k.begin_ns() >= imu.front().t_ns;
-        });
-    DropBefore(first);
+    const auto drop = [&](const Samples& samples) {
+      if (samples.empty()) return;
+      DropBefore(
+          std::find_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {
+            return k.begin_ns() >= samples.front().t_ns;
+          }));
+    };
+    drop(imu);
+    drop(imu1);
   }
 
   void DropBefore(std::vector<PendingKeyframe>::iterator end) {
@@ -239,7 +254,8 @@ struct SegmentBuilder::State {
     DropBefore(keyframes.end());
   }
 
-  bool AddImu(const ImuSample& sample);
+  // Adds it to `samples`: imu or imu1.
+  bool AddSample(const ImuSample& sample, Samples* samples);
   bool AddKeyframe(const KeyframeState& state,
                    std::int64_t image_t_ns,
                    std::span<const KeyframeObservation> observations);
@@ -248,12 +264,13 @@ struct SegmentBuilder::State {
   void GiveUp();
 };
 
-bool SegmentBuilder::State::AddImu(const ImuSample& sample) {
-  if (!imu.empty() && sample.t_ns <= imu.back().t_ns) {
+bool SegmentBuilder::State::AddSample(const ImuSample& sample,
+                                      Samples* samples) {
+  if (!samples->empty() && sample.t_ns <= samples->back().t_ns) {
     ++statistics.imu_ignored;
     return false;
   }
-  imu.push_back(sample);
+  samples->push_back(sample);
   CloseWhatIs();
   // A keyframe may lag by max_gap. A keyframe that lags more cannot continue
   // the current segment, so that older samples are not needed.
@@ -263,18 +280,22 @@ bool SegmentBuilder::State::AddImu(const ImuSample& sample) {
   }
   const auto lowest = std::numeric_limits<std::int64_t>::min();
   if (keyframes.empty() && Elapsed(sample.t_ns, lowest) > max_gap_ns &&
-      Elapsed(sample.t_ns, imu.front().t_ns) > 2 * max_gap_ns) {
+      Elapsed(sample.t_ns, samples->front().t_ns) > 2 * max_gap_ns) {
     const auto oldest = sample.t_ns - static_cast<std::int64_t>(max_gap_ns);
-    imu.erase(imu.begin(), SampleBefore(Earlier(oldest, padding_ns)));
+    samples->erase(samples->cbegin(),
+                   SampleBefore(*samples, Earlier(oldest, padding_ns)));
   }
   return true;
 }
 
 bool SegmentBuilder::State::IsStarved(std::int64_t t_ns) const {
   if (keyframes.empty()) return false;
+  const std::int64_t first_ns = keyframes.front().t_ns();
+  const auto reach = [&](const Samples& samples) {
+    return samples.empty() ? first_ns : std::max(samples.back().t_ns, first_ns);
+  };
   const std::int64_t since =
-      imu.empty() ? keyframes.front().t_ns()
-                  : std::max(imu.back().t_ns, keyframes.front().t_ns());
+      has_second_imu ? std::min(reach(imu), reach(imu1)) : reach(imu);
   return t_ns > since && Elapsed(t_ns, since) > 2 * max_gap_ns;
 }
 
@@ -316,7 +337,8 @@ void SegmentBuilder::State::GiveUp() {
   ++statistics.out_of_memory;
   statistics.keyframes_dropped += keyframes.size();
   std::vector<PendingKeyframe>().swap(keyframes);
-  std::vector<ImuSample>().swap(imu);
+  Samples().swap(imu);
+  Samples().swap(imu1);
 }
 
 SegmentBuilder::SegmentBuilder(const SegmentBuilderOptions& options) noexcept {
@@ -333,7 +355,18 @@ SegmentBuilder& SegmentBuilder::operator=(SegmentBuilder&&) noexcept = default;
 bool SegmentBuilder::AddImu(const ImuSample& sample) noexcept {
   if (state_ == nullptr) return false;
   try {
-    return state_->AddImu(sample);
+    return state_->AddSample(sample, &state_->imu);
+  } catch (...) {
+    state_->GiveUp();
+    return false;
+  }
+}
+
+bool SegmentBuilder::AddSecondImu(const ImuSample& sample) noexcept {
+  if (state_ == nullptr) return false;
+  try {
+    state_->has_second_imu = true;
+    return state_->AddSample(sample, &state_->imu1);
   } catch (...) {
     state_->GiveUp();
     return false;

@@ -111,6 +111,11 @@ class SegmentBuilder {
   // the sample before it.
   bool AddImu(const ImuSample& sample) noexcept;
 
+  // The same of a second IMU, for a rig that has one. Once a sample was added,
+  // segments wait for its samples as for those of the first one, and keyframes
+  // that they do not cover are dropped.
+  bool AddSecondImu(const ImuSample& sample) noexcept;
+
   // Adds a keyframe whose state holds at the timestamp of its images. Returns
   // false and refuses the keyframe if it is not later than the keyframe before
   // it, or the SLAM system is not healthy. If a camera observes a landmark

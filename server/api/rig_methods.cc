@@ -80,6 +80,7 @@ std::string WhyNot(const std::string& field) {
     return "cannot change: it is version 1, and versions never change";
   }
   for (const char* const fixed : {"imu_noise",
+                                  "imu1_noise",
                                   "pixel_sigma_px",
                                   "gravity_mps2",
                                   "groups",

@@ -21,6 +21,7 @@ std::string Unchanging(StoredRig rig) {
   rig.rig.retrigger_fraction = 0;
   rig.rig.reweight_noise = false;
   rig.rig.imu_full_scale = {};
+  rig.rig.imu1_full_scale = {};
   return SerializeRig(rig);
 }
 
@@ -34,10 +35,9 @@ absl::StatusOr<RigUpdate> UpdateRig(UnitOfWork* tx,
   after.create_time_ns = before.create_time_ns;
   if (Unchanging(before) != Unchanging(after)) {
     return absl::InvalidArgumentError(
-        "only labels, prior_sigmas, thresholds, ages, reweight_noise and imu "
-        "of "
-        "a rig can change: what is stored was computed with the rest; create "
-        "another rig");
+        "only labels, prior_sigmas, thresholds, ages, reweight_noise, imu and "
+        "imu1 of a rig can change: what is stored was computed with the rest; "
+        "create another rig");
   }
   if (SerializeRig(before) == SerializeRig(after)) {
     return RigUpdate{std::move(after), false};

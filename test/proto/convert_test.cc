@@ -32,20 +32,31 @@ bool SameBits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
-void ExpectSame(const Calibration& a, const Calibration& b) {
-  EXPECT_TRUE(SameBits(a.imu.s_g, b.imu.s_g));
-  EXPECT_TRUE(SameBits(a.imu.m_g, b.imu.m_g));
-  EXPECT_TRUE(SameBits(a.imu.s_a, b.imu.s_a));
-  EXPECT_TRUE(SameBits(a.imu.m_a, b.imu.m_a));
-  EXPECT_TRUE(SameBits(a.imu.q_AI, b.imu.q_AI));
-  EXPECT_TRUE(SameBits(a.imu.gyro_g_sensitivity, b.imu.gyro_g_sensitivity));
-  EXPECT_TRUE(SameBits(a.imu.accel_position, b.imu.accel_position));
+void ExpectSame(const ImuCalibration& a, const ImuCalibration& b) {
+  EXPECT_TRUE(SameBits(a.s_g, b.s_g));
+  EXPECT_TRUE(SameBits(a.m_g, b.m_g));
+  EXPECT_TRUE(SameBits(a.s_a, b.s_a));
+  EXPECT_TRUE(SameBits(a.m_a, b.m_a));
+  EXPECT_TRUE(SameBits(a.q_AI, b.q_AI));
+  EXPECT_TRUE(SameBits(a.gyro_g_sensitivity, b.gyro_g_sensitivity));
+  EXPECT_TRUE(SameBits(a.accel_position, b.accel_position));
   for (const auto slope : {&ImuCalibration::s_g_slope,
                            &ImuCalibration::m_g_slope,
                            &ImuCalibration::s_a_slope,
                            &ImuCalibration::m_a_slope,
                            &ImuCalibration::q_AI_slope}) {
-    EXPECT_TRUE(SameBits(a.imu.*slope, b.imu.*slope));
+    EXPECT_TRUE(SameBits(a.*slope, b.*slope));
+  }
+}
+
+void ExpectSame(const Calibration& a, const Calibration& b) {
+  ExpectSame(a.imu, b.imu);
+  ASSERT_EQ(a.imu1.has_value(), b.imu1.has_value());
+  if (a.imu1) {
+    ExpectSame(static_cast<const ImuCalibration&>(*a.imu1),
+               static_cast<const ImuCalibration&>(*b.imu1));
+    EXPECT_TRUE(SameBits(a.imu1->q_JI, b.imu1->q_JI));
+    EXPECT_TRUE(SameBits(a.imu1->p_JI, b.imu1->p_JI));
   }
   if (HasSlopes(a)) {
     EXPECT_TRUE(SameBits(a.reference_temperature_c, b.reference_temperature_c));
@@ -85,6 +96,7 @@ void ExpectSame(const Rig& a, const Rig& b) {
                            &ImuNoise::gyro_bias_random_walk,
                            &ImuNoise::accel_bias_random_walk}) {
     EXPECT_TRUE(SameBits(a.imu_noise.*noise, b.imu_noise.*noise));
+    EXPECT_TRUE(SameBits(a.imu1_noise.*noise, b.imu1_noise.*noise));
   }
   EXPECT_TRUE(SameBits(a.pixel_sigma_px, b.pixel_sigma_px));
   EXPECT_TRUE(SameBits(a.gravity_mps2, b.gravity_mps2));
@@ -107,6 +119,8 @@ void ExpectSame(const Rig& a, const Rig& b) {
   EXPECT_EQ(a.reweight_noise, b.reweight_noise);
   EXPECT_EQ(a.imu_full_scale.gyro_radps, b.imu_full_scale.gyro_radps);
   EXPECT_EQ(a.imu_full_scale.accel_mps2, b.imu_full_scale.accel_mps2);
+  EXPECT_EQ(a.imu1_full_scale.gyro_radps, b.imu1_full_scale.gyro_radps);
+  EXPECT_EQ(a.imu1_full_scale.accel_mps2, b.imu1_full_scale.accel_mps2);
 }
 
 void ExpectSame(const MotionSegment& a, const MotionSegment& b) {
@@ -125,11 +139,15 @@ void ExpectSame(const MotionSegment& a, const MotionSegment& b) {
     EXPECT_TRUE(SameBits(x.b_a, y.b_a));
     EXPECT_TRUE(SameBits(x.b_g, y.b_g));
   }
-  ASSERT_EQ(a.imu.size(), b.imu.size());
-  for (std::size_t k = 0; k < a.imu.size(); ++k) {
-    EXPECT_EQ(a.imu[k].t_ns, b.imu[k].t_ns);
-    EXPECT_TRUE(SameBits(a.imu[k].gyro, b.imu[k].gyro));
-    EXPECT_TRUE(SameBits(a.imu[k].accel, b.imu[k].accel));
+  for (const auto samples : {&MotionSegment::imu, &MotionSegment::imu1}) {
+    const std::vector<ImuSample>& x = a.*samples;
+    const std::vector<ImuSample>& y = b.*samples;
+    ASSERT_EQ(x.size(), y.size());
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      EXPECT_EQ(x[k].t_ns, y[k].t_ns);
+      EXPECT_TRUE(SameBits(x[k].gyro, y[k].gyro));
+      EXPECT_TRUE(SameBits(x[k].accel, y[k].accel));
+    }
   }
   ASSERT_EQ(a.landmarks.size(), b.landmarks.size());
   for (std::size_t k = 0; k < a.landmarks.size(); ++k) {
@@ -283,6 +301,28 @@ TEST(Convert, EveryMissingPartOfACalibrationIsNamed) {
           "x.imu.s_g", "x.imu.m_g", "x.imu.s_a", "x.imu.m_a", "x.imu.q_ai"));
 }
 
+TEST(Convert, ASecondImuNeedsAPoseAndTheFirstHasNone) {
+  v1::CalibrationParameters message = ToProto(Calibration());
+  message.mutable_imu()->mutable_q_ji();
+  *message.mutable_imu1() = ToProto(Calibration()).imu();
+  EXPECT_THAT(FaultyFields(message, Calibration()),
+              ElementsAre("x.imu.q_ji", "x.imu1.q_ji", "x.imu1.p_ji"));
+}
+
+TEST(Convert, OnlyARigWithASecondImuHasItsNoise) {
+  Rig rig;
+  rig.id = "r";
+  v1::Rig message = ToProto(rig);
+  message.mutable_imu1_noise();
+  message.mutable_imu1();
+  EXPECT_THAT(FaultyFields(message, Rig()),
+              ElementsAre("x.imu1_noise", "x.imu1"));
+  rig.factory.imu1.emplace();
+  message = ToProto(rig);
+  message.clear_imu1_noise();
+  EXPECT_THAT(FaultyFields(message, Rig()), ElementsAre("x.imu1_noise"));
+}
+
 TEST(Convert, EveryMissingPartOfARigIsNamed) {
   EXPECT_THAT(FaultyFields(v1::Rig(), Rig()),
               ElementsAre("x.name", "x.factory", "x.imu_noise"));
@@ -294,6 +334,7 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   given.factory.cameras.resize(1, random.Camera());
   given.factory.cameras[0].line_delay_s.reset();
   given.factory.cameras[0].time_drift.reset();
+  given.factory.imu1.reset();
   v1::Rig message = ToProto(given);
   message.clear_gravity_mps2();
   message.clear_groups();

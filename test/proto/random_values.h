@@ -87,6 +87,18 @@ class RandomValues {
                  Optional(3 * Int(0, 1)),
                  Optional(3 * Int(0, 1)),
                  Optional(3 * Int(0, 1))};
+    if (Int(0, 1) == 1) {
+      SecondImuCalibration& imu = theta.imu1.emplace();
+      imu.s_g = Vector3();
+      imu.m_g = Vector3();
+      imu.s_a = Vector3();
+      imu.m_a = Vector3();
+      imu.q_AI = Quaternion();
+      imu.gyro_g_sensitivity = Optional(9 * Int(0, 1));
+      imu.s_a_slope = Optional(3 * Int(0, 1));
+      imu.q_JI = Quaternion();
+      imu.p_JI = Vector3();
+    }
     theta.reference_temperature_c = Double();
     for (int i = Int(0, 4); i > 0; --i) theta.cameras.push_back(Camera());
     return theta;
@@ -117,6 +129,10 @@ class RandomValues {
     }
     rig.reweight_noise = Int(0, 1) == 1;
     rig.imu_full_scale = {1.0 + Int(0, 99), 1.0 + Int(0, 999)};
+    if (rig.factory.imu1) {
+      rig.imu1_noise = {Double(), Double(), Double(), Double()};
+      rig.imu1_full_scale = {1.0 + Int(0, 99), 1.0 + Int(0, 999)};
+    }
     return rig;
   }
 
@@ -132,6 +148,9 @@ class RandomValues {
     }
     for (int i = Int(0, 50); i > 0; --i) {
       segment.imu.push_back({Int64(), Vector3(), Vector3()});
+    }
+    for (int i = Int(-20, 20); i > 0; --i) {
+      segment.imu1.push_back({Int64(), Vector3(), Vector3()});
     }
     for (int i = Int(0, 50); i > 0; --i) {
       segment.landmarks.push_back({engine_(), Vector3()});

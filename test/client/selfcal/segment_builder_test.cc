@@ -222,6 +222,51 @@ TEST(SegmentBuilder, DoesNotDependOnWhetherTheImuLagsOrLeads) {
   }
 }
 
+// The samples of the second IMU lag behind those of the first.
+TEST(SegmentBuilder, GivesEachSegmentTheSamplesOfASecondImu) {
+  std::mt19937 random(21);
+  Calibration theta = TwoCameras();
+  theta.imu1.emplace();
+  const Session session = RandomSession(random, 200);
+  SegmentBuilder builder(Options());
+  std::vector<MotionSegment> segments;
+  std::size_t first = 0, second = 0;
+  const auto feed = [&](std::int64_t now_ns) {
+    for (; first < session.imu.size() && session.imu[first].t_ns <= now_ns;
+         ++first) {
+      EXPECT_TRUE(builder.AddImu(session.imu[first]));
+    }
+    for (; second < first && session.imu[second].t_ns <= now_ns - 300 * kMs;
+         ++second) {
+      ImuSample sample = session.imu[second];
+      sample.t_ns += kMs;
+      EXPECT_TRUE(builder.AddSecondImu(sample));
+    }
+  };
+  for (std::size_t k = 0; k < session.states.size(); ++k) {
+    feed(session.states[k].t_ns);
+    builder.AddKeyframe(session.states[k], session.observations[k]);
+    TakeAll(builder, &segments);
+  }
+  feed(session.states.back().t_ns + 1000 * kMs);
+  builder.Flush(2);
+  TakeAll(builder, &segments);
+  ASSERT_EQ(segments.size(), 5u);
+  std::size_t keyframes = 0;
+  for (const MotionSegment& segment : segments) {
+    const auto violations = Validate(segment, theta);
+    EXPECT_TRUE(violations.empty())
+        << violations.front().field << " " << violations.front().message;
+    keyframes += segment.keyframes.size();
+    // Neighbours can be joined by the samples of both.
+    EXPECT_NEAR(static_cast<double>(segment.imu.back().t_ns),
+                static_cast<double>(segment.imu1.back().t_ns),
+                10.0 * kMs);
+  }
+  EXPECT_GE(keyframes, 197u);  // those that both cover
+  EXPECT_FALSE(builder.AddSecondImu({}));
+}
+
 TEST(SegmentBuilder, ClosesBySecondsWhenAsked) {
   std::mt19937 random(5);
   for (int trial = 0; trial < 30; ++trial) {

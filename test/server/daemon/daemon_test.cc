@@ -117,6 +117,32 @@ TEST_F(DaemonTest, RecalibrationRunsToItsEndBeforeItsWatcher) {
   EXPECT_GT(run.solver().iterations(), 0);
 }
 
+TEST_F(DaemonTest, ASecondImuComesOverTheWireIntoAVersion) {
+  const auto daemon = StartAndWait();
+  Rig rig = TestRig("r");
+  AddSecondImu(&rig);
+  CreateRig(rig);
+  Stream(TestSegments(rig, 4));
+  ASSERT_TRUE(AllScored());
+  EXPECT_EQ(WatchToTheEnd("rigs/r/recalibrations/1").state(),
+            v1::Recalibration::SUCCEEDED);
+  grpc::ClientContext context;
+  v1::GetCalibrationRequest request;
+  request.set_name("rigs/r/calibrations/2");
+  v1::Calibration version;
+  ASSERT_TRUE(v1::CalibrationService::NewStub(channel_)
+                  ->GetCalibration(&context, request, &version)
+                  .ok());
+  EXPECT_TRUE(version.parameters().imu1().has_q_ji());
+  const auto& estimates = version.estimates();
+  EXPECT_EQ(std::count_if(estimates.begin(),
+                          estimates.end(),
+                          [](const v1::ComponentEstimate& estimate) {
+                            return estimate.component().starts_with("imu1.");
+                          }),
+            21);
+}
+
 // Scores by Ceres in the daemon; the checks in processes of their own.
 TEST_F(DaemonTest, BothCoresAgreeOnWhatItHasComputed) {
   const auto daemon =

@@ -84,6 +84,44 @@ TEST_F(CoreEstimatorsTest, OptionalBlocksOfANewRigAreEstimated) {
   EXPECT_LT(std::sqrt(version.covariance(added.back(), added.back())), 1e-6);
 }
 
+TEST_F(CoreEstimatorsTest, ASecondImuIsEstimated) {
+  Rig rig = HandheldRig("a");
+  AddSecondImu(&rig);
+  const Calibration truth = rig.factory;
+  rig.factory = PerturbCalibration(truth, {}, 3);
+  rig.table_size = 4;
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  SimulationOptions options;
+  options.seed = 3;
+  const std::vector<MotionSegment> segments =
+      Simulate(rig, truth, rig.factory, *MakeHandheld(30, 1, 3), "s", options)
+          .segments;
+  const StoredCalibration version = VersionFrom(segments);
+  ASSERT_TRUE(SameShape(version.theta, truth));
+  const Eigen::VectorXd error = BoxMinus(version.theta, truth);
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  const std::vector<int> second =
+      MatchComponents(TangentComponents(truth), {"imu1.*"});
+  ASSERT_EQ(second.size(), 21u);
+  for (const int i : second) {
+    const double sigma = std::sqrt(version.covariance(i, i));
+    EXPECT_LT(std::abs(error(i)), 4 * sigma) << i;
+    EXPECT_LT(sigma, 0.3 * prior(i)) << i;
+  }
+  const auto table = store_->GetTables("a");
+  ASSERT_TRUE(table.ok());
+  EXPECT_TRUE(std::any_of(table->begin(), table->end(), [](const Table& of) {
+    return of.group == "imu1" && of.entries.size() == 4;
+  }));
+  MotionSegment without = segments.front();
+  without.key = {"without", 0};
+  without.imu1.clear();
+  const auto refused = pipeline_->Submit("a", without, nullptr);
+  ASSERT_TRUE(refused.ok()) << refused.status();
+  ASSERT_EQ(refused->verdict, SubmitResult::Verdict::kRejected);
+  EXPECT_EQ(refused->violations.front().field, "imu1");
+}
+
 // A device that is used between 0 and 60 degrees, of whose slopes the rig knows
 // nothing.
 TEST_F(CoreEstimatorsTest, SlopesOfADeviceThatWarmsUpAreEstimated) {
