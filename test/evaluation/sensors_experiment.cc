@@ -1,7 +1,8 @@
 // Models of sensors: one, two and four cameras, whose clocks are off from that
 // of the IMU, or drift; rolling shutters; a camera of each model; gyroscopes
-// that react to acceleration; accelerometers whose axes lie apart; a device
-// that warms up. What a model adds is known, estimated, and ignored.
+// that react to acceleration; accelerometers whose axes lie apart; a second
+// IMU; a device that warms up. What a model adds is known, estimated, and
+// ignored.
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdint>
@@ -170,6 +171,19 @@ Setting AccelPositionSetting(Effect effect) {
   return setting;
 }
 
+// Ignoring a second IMU is consistent: its cost is a larger sigma.
+Setting TwoImusSetting(Effect effect) {
+  Setting setting;
+  setting.name = "two_imus_" + EffectName(effect);
+  setting.seed = 7000;
+  setting.rig = HandheldRig("two_imus");
+  AddSecondImu(&setting.rig);
+  setting.truth = setting.rig.factory;
+  if (effect == Effect::kKnown) setting.rig.blocks = {{"imu1.*", false}};
+  if (effect == Effect::kIgnored) setting.rig.factory.imu1.reset();
+  return setting;
+}
+
 Setting LensSetting(DistortionModel model) {
   Setting setting;
   setting.name = "lens_" + std::string(DistortionName(model));
@@ -196,6 +210,7 @@ std::vector<Setting> Settings() {
     settings.push_back(TemperatureSetting(effect));
     settings.push_back(GSensitivitySetting(effect));
     settings.push_back(AccelPositionSetting(effect));
+    settings.push_back(TwoImusSetting(effect));
   }
   for (const DistortionModel model : DistortionModels()) {
     settings.push_back(LensSetting(model));
@@ -239,6 +254,9 @@ std::optional<Run> RunOne(const Setting& setting,
                           double duration_s) {
   Rig rig = setting.rig;
   rig.factory = PerturbCalibration(rig.factory, {}, seed);
+  if (!IsEstimated(rig.blocks, "imu1.q_JI")) {
+    rig.factory.imu1 = setting.rig.factory.imu1;
+  }
   rig.groups = DefaultGroups(rig.blocks, rig.factory);
   SimulationOptions options;
   options.seed = seed;
@@ -256,6 +274,7 @@ std::optional<Run> RunOne(const Setting& setting,
   truth.imu.gyro_g_sensitivity.conservativeResize(
       imu.gyro_g_sensitivity.size());
   truth.imu.accel_position.conservativeResize(imu.accel_position.size());
+  if (!rig.factory.imu1) truth.imu1.reset();
   // The values of one that ignores slopes are compared at the reference.
   if (!HasSlopes(rig.factory)) {
     truth = AtTemperature(truth, truth.reference_temperature_c);
@@ -341,6 +360,10 @@ constexpr Block kBlocks[] = {
     {"s_a [1e-3]", "imu.accel.scale.*", 1e-3},
     {"T_s [1e-5 rad s/m]", "imu.gyro.g_sensitivity.*", 1e-5},
     {"r [mm]", "imu.accel.position.*", 1e-3},
+    {"q_JI [mrad]", "imu1.q_JI.*", 1e-3},
+    {"p_JI [mm]", "imu1.p_JI.*", 1e-3},
+    {"s_g of imu1 [1e-3]", "imu1.gyro.scale.*", 1e-3},
+    {"s_a of imu1 [1e-3]", "imu1.accel.scale.*", 1e-3},
     {"slope of s_g [1e-6/K]", "imu.gyro.scale_slope.*", 1e-6},
     {"slope of s_a [1e-6/K]", "imu.accel.scale_slope.*", 1e-6},
     {"slope of q_CI [urad/K]", "*.q_CI_slope.*", 1e-6},
