@@ -15,12 +15,11 @@
 //   [link parameters | motion of a keyframe | kept | camera parameters | 1 |
 //    poses]
 // where the motion (velocity and biases of each IMU) is that of the current
-// keyframe, and
-// the kept unknowns are shared with other chains: landmarks that they observe
-// as well, biases that walk from one to the next, and states at which they are
-// joined. For tracks of bounded length the cost is linear in the number of
-// keyframes; a track through the whole chain gives the same result, at the cost
-// of a front as wide as the chain.
+// keyframe, and the kept unknowns are shared with other chains: landmarks that
+// they observe as well, biases that walk from one to the next, and states at
+// which they are joined. For tracks of bounded length the cost is linear in the
+// number of keyframes; a track through the whole chain gives the same result,
+// at the cost of a front as wide as the chain.
 //
 // A link between a keyframe and the next is given solved for the earlier state,
 //   x0 = A e + G z,
