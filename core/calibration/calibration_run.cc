@@ -91,16 +91,9 @@ void TestSegments(const std::vector<const MotionSegment*>& segments,
                   const WorkingPoint& point,
                   CalibrationRun* run) {
   CalibrationResult& result = run->result;
-  Rig rig = point.rig();
-  rig.pixel_sigma_px *= point.track_noise_factor();
   run->evidence =
-      CollectEvidence(rig,
-                      result.theta,
+      CollectEvidence(point,
                       segments,
-                      point.problem(),
-                      point.estimate().keyframes,
-                      point.screening(),
-                      point.subspace(),
                       ExpectedReprojectionSquares(
                           result.noise_scales, point.screening().observations));
   const double excess = TestEach(&run->evidence);
@@ -118,22 +111,20 @@ void TestSegments(const std::vector<const MotionSegment*>& segments,
   }
 }
 
-void ReportEstimate(WorkingPoint* point, CalibrationRun* run) {
+void ReportEstimate(const WorkingPoint& point, CalibrationRun* run) {
   CalibrationResult* result = &run->result;
-  ThetaSubspace& subspace = run->estimate.subspace = point->subspace();
-  subspace.bends = BendsOfHeld(*point);
-  result->theta = point->theta();
+  ThetaSubspace& subspace = run->estimate.subspace = point.subspace();
+  subspace.bends = BendsOfHeld(point);
+  result->theta = point.theta();
   const Eigen::MatrixXd by_offset =
-      ThetaByOffset(point->reference(), point->estimate().d);
+      ThetaByOffset(point.reference(), point.estimate().d);
   result->covariance =
       by_offset *
-      CovarianceWithHeld(point->rig(), subspace, point->information().Lambda) *
+      CovarianceWithHeld(point.rig(), subspace, point.information().Lambda) *
       by_offset.transpose();
-  result->Lambda = point->linearised().system.information().Lambda;
+  result->Lambda = point.linearised().system.information().Lambda;
   result->rank = static_cast<int>(subspace.estimated.cols());
   result->held_constant = subspace.unobserved;
-  // Same cost function as for the initial cost.
-  result->final_cost = point->UnweightedCost();
 }
 
 void ReportUse(const WorkingPoint& point, CalibrationResult* result) {
@@ -184,9 +175,11 @@ CalibrationRun RunCalibration(const Rig& rig,
   }
   result.noise_scales = noise.ScalesOfStated();
   result.message = MessageOf(state);
-  ReportEstimate(&point, &run);
+  ReportEstimate(point, &run);
   TestSegments(segments, point, &run);
   ReportUse(point, &result);
+  // Same cost function as for the initial cost.
+  result.final_cost = point.UnweightedCost();
   return run;
 }
 

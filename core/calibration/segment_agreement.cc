@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "core/calibration/segment_part.h"
 #include "core/change/chi_square.h"
-#include "core/information/segment_information.h"
 #include "core/model/median.h"
 
 namespace selfcal {
@@ -18,36 +18,6 @@ constexpr double kChance = 1e-5;
 // Residuals larger than those of the other segments by this factor are not
 // comparable.
 constexpr double kMaxRatio = 3;
-
-// A segment at the estimate, with its used observations only.
-MotionSegment AtEstimate(const MotionSegment& segment,
-                         int first_keyframe,
-                         const CalibrationProblem& problem,
-                         const std::vector<KeyframeState>& keyframes,
-                         const Screening& screening) {
-  MotionSegment at = segment;
-  const auto count = static_cast<int>(segment.keyframes.size());
-  std::copy_n(keyframes.begin() + first_keyframe, count, at.keyframes.begin());
-  at.landmarks.clear();
-  at.observations.clear();
-  for (const ScreenedLandmark& landmark : screening.landmarks) {
-    const Track& track = problem.tracks[landmark.track];
-    const auto index = static_cast<int>(at.landmarks.size());
-    const std::size_t before = at.observations.size();
-    for (const UsedObservation& used : landmark.used) {
-      const TrackObservation& seen = track.observations[used.index];
-      const int k = seen.keyframe - first_keyframe;
-      if (k < 0 || k >= count) continue;
-      at.observations.push_back({k, seen.camera, index, seen.z_px});
-    }
-    if (at.observations.size() < before + 2) {
-      at.observations.resize(before);
-      continue;
-    }
-    at.landmarks.push_back({track.id, landmark.position.Point()});
-  }
-  return at;
-}
 
 std::string Percent(const char* what, double ratio, double usual) {
   char text[160];
@@ -77,34 +47,27 @@ void RelateInertial(std::vector<SegmentEvidence>* evidence) {
 }  // namespace
 
 std::vector<SegmentEvidence> CollectEvidence(
-    const Rig& rig,
-    const Calibration& theta,
+    const WorkingPoint& point,
     const std::vector<const MotionSegment*>& segments,
-    const CalibrationProblem& problem,
-    const std::vector<KeyframeState>& keyframes,
-    const Screening& screening,
-    const ThetaSubspace& subspace,
     double squares_of_a_reprojection) {
-  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
+  const Rig& rig = point.rig();
+  const double pixel_sigma_px = rig.pixel_sigma_px * point.track_noise_factor();
+  const Eigen::MatrixXd basis = TangentBasis(rig, point.subspace());
   std::vector<SegmentEvidence> evidence;
-  int first_keyframe = 0;
+  KeyframeRange range;
   for (const MotionSegment* segment : segments) {
-    const MotionSegment at =
-        AtEstimate(*segment, first_keyframe, problem, keyframes, screening);
-    first_keyframe += static_cast<int>(segment->keyframes.size());
-    const SegmentInformation information = ScoreSegment(rig, theta, at);
+    range.first += range.count;
+    range.count = static_cast<int>(segment->keyframes.size());
+    const SegmentPart part = LineariseSegmentPart(point, range);
     SegmentEvidence& one = evidence.emplace_back();
     one.fit.key = segment->key;
-    one.Lambda = basis.transpose() * information.Lambda * basis;
-    one.eta = basis.transpose() * information.eta;
-    const ResidualStatistics& residuals = information.residuals;
+    one.Lambda = basis.transpose() * part.theta.Lambda * basis;
+    one.eta = basis.transpose() * part.theta.eta;
     if (squares_of_a_reprojection > 0) {
-      one.fit.pixel_ratio = residuals.reprojection_rms_px / rig.pixel_sigma_px /
+      one.fit.pixel_ratio = part.reprojection_rms_px / pixel_sigma_px /
                             std::sqrt(squares_of_a_reprojection);
     }
-    double squares = 0;
-    for (const double rms : residuals.inertial_rms) squares += 3 * rms * rms;
-    one.fit.inertial_ratio = std::sqrt(squares);
+    one.fit.inertial_ratio = part.inertial_rms;
   }
   RelateInertial(&evidence);
   return evidence;

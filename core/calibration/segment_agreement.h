@@ -2,8 +2,11 @@
 // both halves with each other; and finds those that contradict the rest.
 //
 // At the minimum of a calibration each segment is linearised alone, at the
-// states and landmarks of the joint estimate, and tested against the sum of all
-// others (agreement.h).
+// states and landmarks and with the weights of the joint estimate
+// (segment_part.h), and tested against the sum of all others (agreement.h).
+// With other weights, it would be tested how errors scatter that the estimate
+// does not have: residuals with heavy tails move an unweighted sum by far more
+// than a robust estimate.
 //
 // Pure, callable from any thread, deterministic.
 #pragma once
@@ -12,11 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/problem.h"
-#include "core/calibration/screening.h"
 #include "core/calibration/segment_fit.h"
-#include "core/calibration/subspace.h"
-#include "core/model/rig.h"
+#include "core/calibration/working_point.h"
 
 namespace selfcal {
 
@@ -32,17 +32,12 @@ struct SegmentEvidence {
   SegmentFit fit;  // its key and the ratios of its residuals
 };
 
-// `rig` has the noise by which the calibration was weighted; `segments` are
-// those of its problem; `squares_of_a_reprojection` is the expected sum of
-// squares of its two whitened rows, 0 if unknown.
+// At the minimum, with the weights of the calibration. `segments` are those of
+// its problem; `squares_of_a_reprojection` is the expected sum of squares of
+// its two whitened rows, 0 if unknown.
 std::vector<SegmentEvidence> CollectEvidence(
-    const Rig& rig,
-    const Calibration& theta,
+    const WorkingPoint& point,
     const std::vector<const MotionSegment*>& segments,
-    const CalibrationProblem& problem,
-    const std::vector<KeyframeState>& keyframes,
-    const Screening& screening,
-    const ThetaSubspace& subspace,
     double squares_of_a_reprojection);
 
 // Tests each against all others, in `fit.others`. Returns the ratio of the

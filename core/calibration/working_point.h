@@ -41,6 +41,7 @@ class WorkingPoint {
   const Screening& screening() const { return screening_; }
   double track_noise_factor() const { return track_noise_factor_; }
   LinearisedRound& linearised() { return linearised_; }
+  const LinearisedRound& linearised() const { return linearised_; }
   // Information about the offset d, prior included, and covariance of d.
   const SharedInformation& information() const { return linearised_.by_offset; }
   const Eigen::MatrixXd& covariance() const { return covariance_; }

@@ -149,6 +149,88 @@ TEST(Contradictions, ASceneThatMoves) {
   ExpectOnlyTheWrongOneIsLeftOut(session, "residuals");
 }
 
+// Moves the pixels of every third landmark in a direction of its own, further
+// from one keyframe to the next: a feature that slides along an edge.
+void LetFeaturesSlide(double px_per_keyframe,
+                      std::mt19937* random,
+                      MotionSegment* segment) {
+  std::uniform_real_distribution<double> angle(0, 2 * EIGEN_PI);
+  std::vector<Eigen::Vector2d> slides_px(segment->landmarks.size(),
+                                         Eigen::Vector2d::Zero());
+  for (std::size_t m = 0; m < slides_px.size(); m += 3) {
+    const double a = angle(*random);
+    slides_px[m] = px_per_keyframe * Eigen::Vector2d(std::cos(a), std::sin(a));
+  }
+  const double middle = (segment->keyframes.size() - 1) / 2.0;
+  for (Observation& seen : segment->observations) {
+    seen.z_px += (seen.keyframe - middle) * slides_px[seen.landmark];
+  }
+}
+
+// Sums of the tests of each segment against the others.
+struct Disagreement {
+  double squares = 0;
+  int degrees = 0;
+
+  void Add(const CalibrationResult& result) {
+    for (const SegmentFit& fit : result.segment_fits) {
+      EXPECT_EQ(fit.excluded, "");
+      squares += fit.others.statistic;
+      degrees += fit.others.degrees;
+    }
+  }
+};
+
+// A robust loss takes influence from large residuals, so that the weights
+// predict a larger variance of the gradient (1 / 0.89 of it) than it has.
+TEST(Agreement, OfGoodSegmentsIsWhatNoiseExplains) {
+  Disagreement all;
+  for (int seed = 21; seed < 29; ++seed) {
+    const Session session = MakeSession(seed);
+    const CalibrationResult result =
+        Calibrate(session.rig, session.rig.factory, session.segments);
+    ASSERT_EQ(result.status, CalibrateStatus::kConverged);
+    all.Add(result);
+  }
+  ASSERT_GT(all.degrees, 1000);
+  // Two and a half standard deviations of independent tests.
+  EXPECT_NEAR(all.squares, all.degrees, 2.5 * std::sqrt(2.0 * all.degrees));
+}
+
+// Some tracks err by more than others and within the gate: the loss reduces
+// their weight in the estimate, and must do so where segments are compared.
+TEST(Agreement, IsJudgedByTheWeightsOfTheEstimate) {
+  Disagreement all;
+  for (std::uint64_t seed = 11; seed < 14; ++seed) {
+    Rig rig = HandheldRig("r");
+    rig.pixel_sigma_px = kTrackerSigma_px;
+    SimulationOptions options;
+    options.seed = seed;
+    options.mean_track_length = 20;
+    options.revisit_fraction = 0;
+    std::vector<MotionSegment> segments = Simulate(rig,
+                                                   rig.factory,
+                                                   rig.factory,
+                                                   *MakeHandheld(32.5, 1, seed),
+                                                   "session",
+                                                   options)
+                                              .segments;
+    ASSERT_EQ(segments.size(), 8u);
+    std::mt19937 random(static_cast<unsigned>(seed));
+    for (MotionSegment& segment : segments) {
+      LetFeaturesSlide(0.02, &random, &segment);
+    }
+    rig.pixel_sigma_px = 0.5;
+    const CalibrationResult result =
+        Calibrate(rig, rig.factory, segments, {.reweight_noise = true});
+    ASSERT_EQ(result.status, CalibrateStatus::kConverged);
+    all.Add(result);
+  }
+  ASSERT_GT(all.degrees, 400);
+  // No more than what a candidate may have to become active.
+  EXPECT_LT(all.squares, 1.3 * all.degrees);
+}
+
 SegmentEvidence Drawn(double off_sigmas, std::mt19937* random) {
   constexpr int kSize = 5;
   std::normal_distribution<double> normal;
