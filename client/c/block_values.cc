@@ -12,8 +12,11 @@ namespace selfcal::c {
 namespace {
 
 // Sets the value; returns whether it has this number of components.
-template <class Value>
-bool Set(const BlockInfo& info, std::span<const double> from, Value* value) {
+template <class Sensor, class Value>
+bool Set(const BlockInfo& info,
+         const Sensor& sensor,
+         std::span<const double> from,
+         Value* value) {
   if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
     if (from.size() != 4) return false;
     *value = Eigen::Quaterniond(from[0], from[1], from[2], from[3]);
@@ -28,7 +31,8 @@ bool Set(const BlockInfo& info, std::span<const double> from, Value* value) {
     const auto size = static_cast<int>(from.size());
     bool fits = size == value->size();
     if constexpr (std::is_same_v<Value, OptionalVector>) {
-      fits = size == 0 || std::ranges::count(info.sizes, size) > 0;
+      fits = size == 0 ||
+             std::ranges::count(OptionalSizes(info, sensor), size) > 0;
     }
     if (!fits) return false;
     *value = Eigen::Map<const Eigen::VectorXd>(from.data(), size);
@@ -43,17 +47,18 @@ absl::Status SetBlock(const std::string& name,
                       Calibration* theta) {
   bool known = false;
   bool fits = false;
-  const auto set_of = [&](const std::string& sensor) {
-    return [&, sensor](const BlockInfo& info, auto& value) {
-      if (known || name != fmt::format("{}.{}", sensor, info.name)) return;
+  const auto set_of = [&](const std::string& of, auto* sensor) {
+    const auto set = [&](const BlockInfo& info, auto& value) {
+      if (known || name != fmt::format("{}.{}", of, info.name)) return;
       known = true;
-      fits = Set(info, values, &value);
+      fits = Set(info, *sensor, values, &value);
     };
+    VisitWithSlopes(set, *sensor);
   };
-  VisitWithSlopes(set_of("imu"), theta->imu);
-  if (theta->imu1) VisitWithSlopes(set_of("imu1"), *theta->imu1);
+  set_of("imu", &theta->imu);
+  if (theta->imu1) set_of("imu1", &*theta->imu1);
   for (std::size_t j = 0; j < theta->cameras.size(); ++j) {
-    VisitWithSlopes(set_of(fmt::format("cam{}", j)), theta->cameras[j]);
+    set_of(fmt::format("cam{}", j), &theta->cameras[j]);
   }
   if (!known) {
     return absl::InvalidArgumentError(

@@ -63,26 +63,30 @@ std::string ImageSizeFault(int size_px) {
          std::to_string(kMaxImageSize_px) + "]";
 }
 
-std::string CountFault(const BlockInfo& info, int count) {
-  const auto [first, second] = info.sizes;
+template <class Sensor>
+std::string CountFault(const BlockInfo& info, const Sensor& sensor, int count) {
+  const auto [first, second] = OptionalSizes(info, sensor);
   if (count == first || count == second) return "";
   return "has " + std::to_string(count) + " values; it may have 0" +
          (second > 0 ? ", " + std::to_string(second) : "") + " or " +
          std::to_string(first);
 }
 
-// The fault of the value of a block; empty if there is none.
-template <class Value>
-std::string Fault(const BlockInfo& info, const Value& value) {
+// The fault of the value of a block of a sensor; empty if there is none.
+template <class Sensor, class Value>
+std::string Fault(const BlockInfo& info,
+                  const Sensor& sensor,
+                  const Value& value) {
   if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
     return QuaternionFault(value, info.limit);
   } else if constexpr (std::is_same_v<Value, double>) {
-    return Fault(info, Eigen::Matrix<double, 1, 1>(value));
+    return Fault(info, sensor, Eigen::Matrix<double, 1, 1>(value));
   } else if constexpr (std::is_same_v<Value, std::optional<double>>) {
-    return value ? Fault(info, *value) : "";
+    return value ? Fault(info, sensor, *value) : "";
   } else if constexpr (std::is_same_v<Value, OptionalVector>) {
     if (value.size() == 0) return "";
-    const std::string fault = CountFault(info, static_cast<int>(value.size()));
+    const std::string fault =
+        CountFault(info, sensor, static_cast<int>(value.size()));
     return fault.empty() ? SizeFault(value, info.limit) : fault;
   } else {
     if (info.accepted == Accepted::kPositive) {
@@ -99,7 +103,9 @@ template <class Imu>
 void CheckImu(const Imu& imu, const std::string& path, ViolationList* list) {
   VisitWithSlopes(
       [&](const BlockInfo& info, const auto& value) {
-        AddIf(path + "." + std::string(info.field), Fault(info, value), list);
+        AddIf(path + "." + std::string(info.field),
+              Fault(info, imu, value),
+              list);
       },
       imu);
 }
@@ -110,8 +116,9 @@ void CheckCamera(const CameraCalibration& camera,
   VisitWithSlopes(
       [&](const BlockInfo& info, const auto& value) {
         AddIf(path + "." + std::string(info.field),
-              info.accepted == Accepted::kCoefficients ? DistortionFault(camera)
-                                                       : Fault(info, value),
+              info.accepted == Accepted::kCoefficients
+                  ? DistortionFault(camera)
+                  : Fault(info, camera, value),
               list);
       },
       camera);

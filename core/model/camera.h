@@ -71,7 +71,9 @@ struct CameraCalibration {
   // rotation as a rotation vector in I [rad/K]; without values, zero.
   OptionalVector q_CI_slope, p_CI_slope;
   OptionalVector f_slope, c_slope;
-  int width_px = 0;  // of the image; constant, not estimated
+  OptionalVector distortion_slope;
+  OptionalVector time_offset_slope;  // of size 1 [s/K]
+  int width_px = 0;                  // of the image; constant, not estimated
   int height_px = 0;
 
   // Size of (f, c, distortion): the number of columns of d z / d intrinsics.

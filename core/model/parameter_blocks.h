@@ -61,12 +61,16 @@ struct BlockInfo {
   // If false, it is held constant unless the rig estimates it (BlockSetting).
   bool estimated = true;
   // The numbers of components that an optional vector may have, the first of
-  // which it gets where it is added.
+  // which it gets where it is added (see OptionalSizes).
   std::array<int, 2> sizes = {};
   StoredSince since = StoredSince::kNames;
 };
 
 inline constexpr int kReferenceWidth_px = 640;
+
+// In BlockInfo::sizes: one component for each coefficient of the distortion.
+// Its sigmas are in units of the reference sigma of the coefficient.
+inline constexpr int kAsDistortion = -1;
 
 // The default of the member is that of data from before the block existed. A
 // sensor may lack an optional one, which then has no components.
@@ -264,13 +268,16 @@ template <class Sensor>
 struct SlopeBlock : Block<Sensor> {
   std::variant<Eigen::Vector3d Sensor::*,
                Eigen::Vector2d Sensor::*,
-               Eigen::Quaterniond Sensor::*>
+               Eigen::Quaterniond Sensor::*,
+               DistortionVector Sensor::*,
+               double Sensor::*>
       of;
 };
 
 // Prior sigmas are assumptions: 0.03 % per kelvin of a scale, about 1e-4 of a
-// focal length, and 0.003 degrees between camera and IMU. Reference sigmas are
-// those of the blocks, over 20 K.
+// focal length, a hundredth of the reference sigma of a coefficient of the
+// distortion, 0.003 degrees between camera and IMU, and a microsecond of the
+// time offset. Reference sigmas are those of the blocks, over 20 K.
 inline constexpr SlopeBlock<ImuCalibration> kImuSlopes[] = {
     {{{.name = "gyro.scale_slope",
        .field = "s_g_slope",
@@ -381,7 +388,42 @@ inline constexpr SlopeBlock<CameraCalibration> kCameraSlopes[] = {
        .sizes = {2}},
       &CameraCalibration::c_slope},
      &CameraCalibration::c},
+    {{{.name = "distortion_slope",
+       .field = "distortion_slope",
+       .unit = "1/K",
+       .sigma_ref = 0.05,
+       .prior_sigma = 0.01,
+       .limit = 0.1,
+       .group = "camera",
+       .words = "the change of the distortion with temperature ",
+       .estimated = false,
+       .sizes = {kAsDistortion}},
+      &CameraCalibration::distortion_slope},
+     &CameraCalibration::distortion},
+    {{{.name = "time_offset_slope",
+       .field = "time_offset_slope",
+       .unit = "s/K",
+       .sigma_ref = 3e-5,
+       .prior_sigma = 1e-6,
+       .limit = 1e-3,
+       .group = "time",
+       .words = "the change of the delay of the images with temperature",
+       .estimated = false,
+       .sizes = {1}},
+      &CameraCalibration::time_offset_slope},
+     &CameraCalibration::time_offset_s},
 };
+
+// BlockInfo::sizes for the sensor that has the block.
+template <class Sensor>
+std::array<int, 2> OptionalSizes(const BlockInfo& info, const Sensor& sensor) {
+  if constexpr (std::is_same_v<Sensor, CameraCalibration>) {
+    if (info.sizes[0] == kAsDistortion) {
+      return {static_cast<int>(sensor.distortion.size()), 0};
+    }
+  }
+  return info.sizes;
+}
 
 template <class Value>
 int TangentDimension(const Value& value) {

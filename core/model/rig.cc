@@ -145,23 +145,25 @@ std::vector<ParameterGroup> DefaultGroups(
 
 void AddEstimatedBlocks(const std::vector<BlockSetting>& blocks,
                         Calibration* theta) {
-  const auto add_to = [&](const std::string& sensor) {
-    return [&blocks, sensor]<class Value>(const BlockInfo& info, Value& value) {
+  const auto add_to = [&]<class Sensor>(const std::string& name,
+                                        Sensor* sensor) {
+    const auto add = [&]<class Value>(const BlockInfo& info, Value& value) {
       if (TangentDimension(value) > 0) return;
       const BlockSetting* setting =
-          LastSetting(blocks, sensor + "." + std::string(info.name));
+          LastSetting(blocks, name + "." + std::string(info.name));
       if (setting == nullptr || !setting->estimated) return;
       if constexpr (std::is_same_v<Value, std::optional<double>>) {
         value = 0;
       } else if constexpr (std::is_same_v<Value, OptionalVector>) {
-        value.setZero(info.sizes[0]);
+        value.setZero(OptionalSizes(info, *sensor)[0]);
       }
     };
+    VisitWithSlopes(add, *sensor);
   };
-  VisitWithSlopes(add_to("imu"), theta->imu);
-  if (theta->imu1) VisitWithSlopes(add_to("imu1"), *theta->imu1);
+  add_to("imu", &theta->imu);
+  if (theta->imu1) add_to("imu1", &*theta->imu1);
   for (std::size_t j = 0; j < theta->cameras.size(); ++j) {
-    VisitWithSlopes(add_to("cam" + std::to_string(j)), theta->cameras[j]);
+    add_to("cam" + std::to_string(j), &theta->cameras[j]);
   }
 }
 
@@ -191,11 +193,16 @@ std::vector<int> FreeComponents(const Rig& rig) {
 }
 
 std::vector<char> EstimatedTimeOffsets(const Rig& rig) {
+  const std::vector<TangentComponent> components =
+      TangentComponents(rig.factory);
   const std::vector<int> free = FreeComponents(rig);
   std::vector<char> estimated;
-  for (int j = 0; j < static_cast<int>(rig.factory.cameras.size()); ++j) {
-    estimated.push_back(std::binary_search(
-        free.begin(), free.end(), TimeOffsetComponent(rig.factory, j)));
+  for (std::size_t j = 0; j < rig.factory.cameras.size(); ++j) {
+    const std::string offset = "cam" + std::to_string(j) + ".time_offset";
+    const std::string slope = offset + std::string(kSlopeSuffix);
+    estimated.push_back(std::any_of(free.begin(), free.end(), [&](int i) {
+      return components[i].name == offset || components[i].name == slope;
+    }));
   }
   return estimated;
 }

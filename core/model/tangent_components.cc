@@ -28,18 +28,29 @@ std::vector<TangentComponent> TangentComponents(const Calibration& theta) {
     const std::string block = place.Name();
     const std::string unit(place.info.unit);
     const double sigma_ref = ReferenceSigma(theta, place);
-    if constexpr (std::is_same_v<Value, double> ||
-                  std::is_same_v<Value, std::optional<double>>) {
-      components.push_back({block, unit, sigma_ref});
-    } else if constexpr (std::is_same_v<Value, DistortionVector>) {
+    const auto add_coefficients = [&](double scale) {
       for (const CameraCoefficient& coefficient :
            ModelInfo(theta.cameras[place.camera].model).coefficients) {
         components.push_back({block + "." + std::string(coefficient.name),
                               unit,
-                              coefficient.sigma_ref});
+                              scale * coefficient.sigma_ref});
       }
+    };
+    if constexpr (std::is_same_v<Value, double> ||
+                  std::is_same_v<Value, std::optional<double>>) {
+      components.push_back({block, unit, sigma_ref});
+    } else if constexpr (std::is_same_v<Value, DistortionVector>) {
+      add_coefficients(1);
     } else if constexpr (std::is_same_v<Value, OptionalVector>) {
       const Eigen::Index size = value.size();
+      if (place.info.sizes[0] == kAsDistortion) {
+        add_coefficients(sigma_ref);
+        return;
+      }
+      if (size == 1) {
+        components.push_back({block, unit, sigma_ref});
+        return;
+      }
       for (Eigen::Index i = 0; i < size; ++i) {
         std::string name = block;
         if (size == 9) name += std::string(".") + "xyz"[i / 3];

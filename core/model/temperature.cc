@@ -41,6 +41,7 @@ void VisitSlopes(Theta& theta, const Visitor& visit) {
 void Move(const Eigen::VectorXd& by, Eigen::Quaterniond* q) {
   *q = (*q * Exp(by)).normalized();
 }
+void Move(const Eigen::VectorXd& by, double* value) { *value += by[0]; }
 template <class Vector>
 void Move(const Eigen::VectorXd& by, Vector* v) {
   *v += by;

@@ -64,6 +64,9 @@ class RandomValues {
     camera.p_CI_slope = Optional(3 * Int(0, 1));
     camera.f_slope = Optional(2 * Int(0, 1));
     camera.c_slope = Optional(2 * Int(0, 1));
+    camera.distortion_slope =
+        Optional(static_cast<int>(camera.distortion.size()) * Int(0, 1));
+    camera.time_offset_slope = Optional(Int(0, 1));
     return camera;
   }
 

@@ -269,6 +269,28 @@ TEST(Temperature, SlopesAreFoundWithTheRest) {
   });
 }
 
+TEST(Temperature, SlopesOfDistortionAndTimeOffsetAreFound) {
+  const Calibration device = RigOfCameras(1).factory;
+  Calibration truth = device;
+  truth.cameras[0].distortion_slope = 2e-4 * device.cameras[0].distortion;
+  truth.cameras[0].time_offset_slope.setConstant(1, 3e-5);
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = RigOfCameras(1);
+    rig.blocks = {{"*.time_offset", true},
+                  {"*.distortion_slope", true},
+                  {"*.time_offset_slope", true}};
+    AddEstimatedBlocks(rig.blocks, &rig.factory);
+    rig.factory = PerturbCalibration(rig.factory, {}, seed);
+    rig.prior_sigmas = {{"*.distortion_slope.*", 2e-4},
+                        {"*.time_offset_slope", 3e-5}};
+    rig.groups = DefaultGroups(rig.blocks, rig.factory);
+    const Errors errors = CalibrateSimulated(
+        rig, truth, seed, {.temperatures_c = kTemperatures_c});
+    ExpectLastIsFound(errors, 0.5 * truth.cameras[0].time_offset_slope[0]);
+    return errors;
+  });
+}
+
 // Segments of one temperature say nothing about slopes, and the rest is that at
 // this temperature.
 TEST(Temperature, OfOneTemperatureTheValuesThereAreFound) {

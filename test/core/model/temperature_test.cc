@@ -14,15 +14,19 @@ namespace {
 
 // Random slopes of all blocks that may have one.
 Calibration WithAllSlopes(RandomValues* random, Calibration theta) {
-  const auto fill = [&]<class Value>(const BlockInfo& info, Value& value) {
-    if constexpr (std::is_same_v<Value, OptionalVector>) {
-      if (info.name.ends_with(kSlopeSuffix)) {
-        value = random->Vector(info.sizes[0], 5e-3);
+  const auto fill = [&](auto* sensor) {
+    const auto fill_block = [&]<class Value>(const BlockInfo& info,
+                                             Value& value) {
+      if constexpr (std::is_same_v<Value, OptionalVector>) {
+        if (info.name.ends_with(kSlopeSuffix)) {
+          value = random->Vector(OptionalSizes(info, *sensor)[0], 5e-3);
+        }
       }
-    }
+    };
+    VisitWithSlopes(fill_block, *sensor);
   };
-  VisitWithSlopes(fill, theta.imu);
-  for (CameraCalibration& camera : theta.cameras) VisitWithSlopes(fill, camera);
+  fill(&theta.imu);
+  for (CameraCalibration& camera : theta.cameras) fill(&camera);
   theta.reference_temperature_c = random->Uniform(-20, 60);
   return theta;
 }
@@ -36,7 +40,12 @@ TEST(Temperature, AtTheReferenceOnlyTheSlopesAreGone) {
   EXPECT_FALSE(HasSlopes(at));
   ASSERT_TRUE(SameShape(at, plain));
   EXPECT_LT(BoxMinus(at, plain).norm(), 1e-14);
-  EXPECT_EQ(TangentSize(theta), TangentSize(plain) + 15 + 3 * 10);
+  int coefficients = 0;
+  for (const CameraCalibration& camera : theta.cameras) {
+    coefficients += static_cast<int>(camera.distortion.size());
+  }
+  EXPECT_EQ(TangentSize(theta),
+            TangentSize(plain) + 15 + 3 * 11 + coefficients);
 }
 
 TEST(Temperature, ValuesFollowTheSlopes) {
@@ -50,6 +59,14 @@ TEST(Temperature, ValuesFollowTheSlopes) {
       (at.cameras[1].f - theta.cameras[1].f - 12 * theta.cameras[1].f_slope)
           .norm(),
       1e-11);
+  EXPECT_LT((at.cameras[1].distortion - theta.cameras[1].distortion -
+             12 * theta.cameras[1].distortion_slope)
+                .norm(),
+            1e-14);
+  EXPECT_NEAR(at.cameras[2].time_offset_s,
+              theta.cameras[2].time_offset_s +
+                  12 * theta.cameras[2].time_offset_slope[0],
+              1e-15);
   EXPECT_LT((Log(theta.cameras[2].q_CI.conjugate() * at.cameras[2].q_CI) -
              12 * theta.cameras[2].q_CI_slope)
                 .norm(),
@@ -108,6 +125,38 @@ TEST(Temperature, SlopesOfOtherReferencesAreOfAnotherShape) {
   Calibration elsewhere = plain;
   elsewhere.reference_temperature_c += 1;
   EXPECT_TRUE(SameShape(plain, elsewhere));
+}
+
+TEST(Temperature, SlopesOfADistortionAreThoseOfItsCoefficients) {
+  Calibration theta;
+  theta.cameras.resize(1);
+  theta.cameras[0].model = DistortionModel::kRadialTangential;
+  theta.cameras[0].distortion.setZero(4);
+  Rig rig;
+  rig.blocks = {{"cam0.distortion_slope", true},
+                {"cam0.time_offset_slope", true}};
+  AddEstimatedBlocks(rig.blocks, &theta);
+  rig.factory = theta;
+  rig.groups = DefaultGroups(rig.blocks, theta);
+  const auto components = TangentComponents(theta);
+  const std::size_t first = components.size() - 5;
+  EXPECT_EQ(components[first].name, "cam0.distortion_slope.k1");
+  EXPECT_EQ(components[first + 3].name, "cam0.distortion_slope.p2");
+  EXPECT_EQ(components[first + 4].name, "cam0.time_offset_slope");
+  EXPECT_EQ(components[first + 4].unit, "s/K");
+  const double of_k1 =
+      components[CameraTangentOffset(theta, 0) + kCameraDistortion].sigma_ref;
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  EXPECT_DOUBLE_EQ(components[first].sigma_ref, 0.05 * of_k1);
+  EXPECT_NEAR(prior(static_cast<int>(first)), 0.01 * of_k1, 1e-12 * of_k1);
+  // A slope depends on the time offset, which itself is held.
+  EXPECT_EQ(EstimatedTimeOffsets(rig), std::vector<char>{1});
+  theta.cameras[0].distortion_slope.resize(3);
+  bool found = false;
+  for (const Violation& violation : Validate(theta, "")) {
+    found |= violation.field == "cameras[0].distortion_slope";
+  }
+  EXPECT_TRUE(found);
 }
 
 TEST(Temperature, SlopesAreAddedWhereARigEstimatesThem) {
