@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/calibration/noise_scale.h"
 #include "server/pipeline/candidate_checks.h"
 
 namespace selfcal::server {
@@ -40,13 +41,39 @@ void CheckHalves(const CheckContext& context,
   AddResult("halves", halves.probability, limit, failure, checks);
 }
 
-// The variance over its expectation that noise exceeds once in a thousand times
-// (Wilson and Hilferty's approximation of the chi-square distribution).
-double LargestByChance(int degrees) {
-  constexpr double kSigmas = 3.09;  // of a normal distribution, one-sided
+// Quantiles of a normal distribution: one in a thousand, one in a hundred.
+constexpr double kThousandth = 3.09;
+constexpr double kHundredth = 2.33;
+
+// The variance over its expectation that noise exceeds by chance (Wilson and
+// Hilferty's approximation of the chi-square distribution).
+double LargestByChance(int degrees, double quantile) {
   if (degrees == 0) return 0;
   const double variance = 2 / (9.0 * degrees);
-  return std::pow(1 - variance + kSigmas * std::sqrt(variance), 3);
+  return std::pow(1 - variance + quantile * std::sqrt(variance), 3);
+}
+
+bool OfImuReadings(NoiseKind kind) {
+  if (kind == NoiseKind::kPixel) return false;
+  const NoiseKind first = OfFirstImu(kind);
+  return first == NoiseKind::kGyro || first == NoiseKind::kAccel;
+}
+
+// True if the readings of an IMU err by much more than the rig states. Noise may
+// be stated wrongly, but an error that is no noise looks the same.
+bool ReadingsErrMore(const CheckContext& context) {
+  return std::any_of(context.result.noise_scales.begin(),
+                     context.result.noise_scales.end(),
+                     [&](const NoiseScale& scale) {
+                       return OfImuReadings(scale.kind) && scale.determined() &&
+                              scale.used > context.limits.max_plain_imu_noise;
+                     });
+}
+
+double MaxDisagreement(const CheckContext& context, int degrees) {
+  if (ReadingsErrMore(context)) return LargestByChance(degrees, kHundredth);
+  return std::max(context.limits.max_disagreement,
+                  LargestByChance(degrees, kThousandth));
 }
 
 // Sums the tests of each segment against all others. If the squares exceed
@@ -61,8 +88,7 @@ void CheckDisagreement(const CheckContext& context,
     squares += fit.others.statistic;
     degrees += fit.others.degrees;
   }
-  const double limit =
-      std::max(context.limits.max_disagreement, LargestByChance(degrees));
+  const double limit = MaxDisagreement(context, degrees);
   if (degrees < kLeastDegrees) {
     AddNotTested("disagreement",
                  limit,

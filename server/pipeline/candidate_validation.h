@@ -74,10 +74,12 @@ struct CandidateLimits {
   double max_error_ratio = 1.1;
   // Largest variance between segments over that which noise explains; more if
   // few degrees of freedom are tested, so that chance alone exceeds it once in
-  // a thousand times. Simulated devices of ten kinds have 0.76 to 1.21, a Tango
-  // 0.9 to 1.1, EuRoC V1_01 with unoptimised states at 1 keyframe a second 1.4
-  // to 1.8.
+  // a thousand times. TRUSTFIGURES
   double max_disagreement = 1.3;
+  // If the readings of an IMU have more than this many times the noise that the
+  // rig states, max_disagreement does not apply, and segments may disagree only
+  // by what chance exceeds once in a hundred times. Chosen, not measured.
+  double max_plain_imu_noise = 2;
 };
 
 struct CandidateEvidence {

@@ -215,6 +215,15 @@ std::string StateOf(const TrustVersion& version) {
              : "other";
 }
 
+// The variance between segments over that which noise explains, if tested.
+Cell Disagreement(const server::StoredCalibration& stored) {
+  if (!stored.validation) return {};
+  for (const server::ValidationCheck& check : stored.validation->checks) {
+    if (check.name == "disagreement" && check.value > 0) return check.value;
+  }
+  return {};
+}
+
 void WriteVersions(const std::vector<Trial>& trials, Context* context) {
   std::vector<std::string> columns = {"kind",
                                       "seed",
@@ -232,7 +241,8 @@ void WriteVersions(const std::vector<Trial>& trials, Context* context) {
                                       "segments",
                                       "observations",
                                       "dropped",
-                                      "rms [px]"};
+                                      "rms [px]",
+                                      "disagreement"};
   for (int i = 0; i < kNoiseKinds; ++i) {
     columns.push_back(NoiseKindName(static_cast<NoiseKind>(i)) + " / truth");
   }
@@ -265,7 +275,8 @@ void WriteVersions(const std::vector<Trial>& trials, Context* context) {
                                static_cast<long>(r.segments),
                                static_cast<long>(r.observations),
                                static_cast<long>(r.observations_dropped),
-                               r.reprojection_rms_after_px};
+                               r.reprojection_rms_after_px,
+                               Disagreement(stored)};
       AddNoise(trial, report, &row);
       row.push_back(stored.seconds);
       row.push_back(fmt::format("{}", fmt::join(stored.reasons, "; ")));

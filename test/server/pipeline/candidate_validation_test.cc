@@ -300,6 +300,26 @@ TEST_F(CandidateTest, SegmentsMustAgreeAsFarAsNoiseAllows) {
   EXPECT_THAT(Problem("disagreement"), HasSubstr("1.31 times the variance"));
 }
 
+// What looks like noise of the IMU may act on all segments alike.
+TEST_F(CandidateTest, SegmentsMustAgreeBetterIfTheImuSeemsNoisy) {
+  const auto compare = [&](NoiseKind kind, double used, double excess) {
+    result_.noise_scales = {
+        {.kind = kind, .factor = used, .log_sigma = 0.05, .used = used}};
+    for (SegmentFit& fit : result_.segment_fits) {
+      fit.others = {excess * 26, 26, 0.5};
+    }
+    return OutcomeOf("disagreement");
+  };
+  // 208 degrees: chance exceeds 1.24 once in a hundred times.
+  EXPECT_EQ(compare(NoiseKind::kGyro, 1.9, 1.27), CheckOutcome::kPassed);
+  EXPECT_EQ(compare(NoiseKind::kGyro, 2.1, 1.27), CheckOutcome::kFailed);
+  EXPECT_EQ(compare(NoiseKind::kSecondAccel, 2.1, 1.27), CheckOutcome::kFailed);
+  EXPECT_EQ(compare(NoiseKind::kGyro, 2.1, 1.2), CheckOutcome::kPassed);
+  EXPECT_EQ(compare(NoiseKind::kPixel, 2.1, 1.27), CheckOutcome::kPassed);
+  EXPECT_EQ(compare(NoiseKind::kGyroBiasWalk, 2.1, 1.27),
+            CheckOutcome::kPassed);
+}
+
 TEST_F(CandidateTest, WithoutAnyTestOfOtherDataItIsNotConfirmed) {
   result_.halves = {};
   EXPECT_EQ(OutcomeOf("halves"), CheckOutcome::kNotTested);

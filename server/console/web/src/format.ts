@@ -60,6 +60,8 @@ const kParts: Record<string, string> = {
   q_AI: 'rotation of the accelerometer',
   q_CI: 'rotation to the IMU',
   p_CI: 'position to the IMU',
+  q_JI: 'rotation to the first IMU',
+  p_JI: 'position to the first IMU',
 };
 
 // The name of a block that is the slope of another one with temperature ends so.
@@ -81,14 +83,13 @@ export function component(name: string): string {
   if (camera && first) {
     return [`${say(first)} of camera ${camera[1]}`, ...rest].join(', ');
   }
-  if (first === 'q_AI' || first === 'q_AI' + kSlope) {
-    return [say(first), ...rest].join(', ');
+  if (!['imu', 'imu1'].includes(device) || rest.length === 0) return name;
+  const owner = device === 'imu1' ? ' of the second IMU' : '';
+  if (/^(q_AI|q_JI|p_JI)/.test(first)) {
+    return [say(first) + owner, ...rest].join(', ');
   }
-  if (device === 'imu' && rest.length > 0) {
-    const [what, ...axis] = rest;
-    return [`${say(what)} of the ${say(first)}`, ...axis].join(', ');
-  }
-  return name;
+  const [what, ...axis] = rest;
+  return [`${say(what)} of the ${say(first)}${owner}`, ...axis].join(', ');
 }
 
 // 'angle [°]'; a quantity without a unit has none in its heading.
