@@ -144,6 +144,9 @@ int EnsureRig(Context* context,
       input.rig, input.from, ModelNamed(input.camera_model), *first, &losses);
   PrintLosses(losses);
   if (!recorded.ok()) return FailInput(recorded.status());
+  const absl::Status imus =
+      CheckImus(*first, recorded->rig.factory().has_imu1());
+  if (!imus.ok()) return FailInput(imus);
   if (!first->map) {
     const int moved =
         MoveToStart(input.recordings.temperature_c, first, &*recorded);

@@ -68,6 +68,8 @@ absl::StatusOr<Stated> StatedBy(Recording* recording,
                                 std::vector<Loss>* losses) {
   Stated stated;
   if (recording->imu_noise()) stated.rig.imu_noise = *recording->imu_noise();
+  stated.rig.factory.imu1 = recording->imu1_calibration();
+  if (recording->imu1_noise()) stated.rig.imu1_noise = *recording->imu1_noise();
   for (std::size_t j = 0; j < recording->cameras().size(); ++j) {
     const RecordedCamera& camera = recording->cameras()[j];
     const bool given = std::any_of(

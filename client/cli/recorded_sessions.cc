@@ -82,6 +82,18 @@ std::span<const ImuSample> Readings(const RecordedSession& session) {
   return session.recording->imu();
 }
 
+absl::Status CheckImus(const RecordedSession& session, bool rig_has_second) {
+  if (!rig_has_second) return absl::OkStatus();
+  if (session.recording && !session.recording->imu1().empty()) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(fmt::format(
+      "{}: there are no readings of the second IMU that the calibration has: a "
+      "bag needs --imu-topic for both, a folder imu1.csv; or leave the second "
+      "IMU out of the calibration",
+      session.name));
+}
+
 void AddRecordingsOptions(CLI::App* command, RecordingsInput* input) {
   command
       ->add_option("RECORDING",
@@ -97,9 +109,12 @@ void AddRecordingsOptions(CLI::App* command, RecordingsInput* input) {
                    "Topic of a camera's images; repeatable, in the order of "
                    "the calibration's cameras [all topics of images]")
       ->allow_extra_args(false);
-  command->add_option("--imu-topic",
-                      input->topics.imu_topic,
-                      "Topic of the readings [the only one of its type]");
+  command
+      ->add_option("--imu-topic",
+                   input->topics.imu_topics,
+                   "Topic of the readings [the only one of its type]; given "
+                   "again, that of a second IMU")
+      ->allow_extra_args(false);
   command->add_option("--keyframes", input->keyframes, "Keyframes per segment")
       ->check(CLI::Range(20, 2000))
       ->capture_default_str();

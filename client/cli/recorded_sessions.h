@@ -37,6 +37,10 @@ int CameraCount(const RecordedSession& session);
 // Readings of the session; of a map those of its first segment.
 std::span<const ImuSample> Readings(const RecordedSession& session);
 
+// INVALID_ARGUMENT if the rig has a second IMU and the session has no readings
+// of it.
+absl::Status CheckImus(const RecordedSession& session, bool rig_has_second);
+
 // Adds RECORDING..., --camera-topic, --imu-topic, --keyframes, --keyframe-rate
 // and --temperature. `input` must outlive the command.
 void AddRecordingsOptions(CLI::App* command, RecordingsInput* input);

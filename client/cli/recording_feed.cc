@@ -76,6 +76,9 @@ class Feed {
                       rig_,
                       active.rig.factory.cameras.size())));
     }
+    const absl::Status imus =
+        CheckImus(*session_, active.rig.factory.imu1.has_value());
+    if (!imus.ok()) return FailInput(imus);
     const auto name = ParseSegmentName(last.name());
     counts_->continued = counts_->continued || name;
     return session_->map ? SendMap(name ? name->key.index : -1)
@@ -98,6 +101,12 @@ class Feed {
 
   // Tracks what comes after the segment `last`.
   int Track(DeviceVersion active, const v1::Segment& last) {
+    if (!active.rig.factory.imu1 && !session_->recording->imu1().empty()) {
+      PrintError(
+          fmt::format("{}: the readings of the second IMU are not used: the "
+                      "rig has one IMU",
+                      session_->name));
+    }
     const absl::Status aligned = AlignClocks(active.theta, {}, session_);
     if (!aligned.ok()) return FailInput(aligned);
     OdometryOptions odometry{.session = session_->name,

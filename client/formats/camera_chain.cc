@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "client/formats/format_error.h"
 #include "client/formats/tool_models.h"
 #include "client/formats/yaml_values.h"
@@ -57,19 +59,30 @@ void ReadIntrinsics(const YAML::Node& node, CameraCalibration* camera) {
 
 }  // namespace
 
-ChainFiles ReadChainFiles(const std::vector<TextFile>& files) {
+ChainFiles ReadChainFiles(const std::vector<TextFile>& files, int imu_files) {
   ChainFiles result;
+  int of_cameras = 0, of_imus = 0;
   for (const TextFile& file : files) {
     const YAML::Node root = ParseYaml(file);
-    const bool cameras = Has(root, "cam0");
-    if (!cameras && Has(root, "imu1")) result.several_imus = true;
-    (cameras ? result.cameras : result.imu)
-        .reset(!cameras && Has(root, "imu0") ? root["imu0"] : root);
+    if (Has(root, "cam0")) {
+      result.cameras.reset(root);
+      ++of_cameras;
+      continue;
+    }
+    ++of_imus;
+    if (!Has(root, "imu0")) result.imus.push_back(root);
+    for (int i = 0; Has(root, fmt::format("imu{}", i)); ++i) {
+      result.imus.push_back(root[fmt::format("imu{}", i)]);
+    }
   }
-  if (files.size() != 2 || !result.cameras.IsMap() || !result.imu.IsMap()) {
-    throw FormatError(
+  const bool maps = std::all_of(result.imus.begin(),
+                                result.imus.end(),
+                                [](const auto& imu) { return imu.IsMap(); });
+  if (of_cameras != 1 || of_imus < 1 || of_imus > imu_files || !maps) {
+    throw FormatError(fmt::format(
         "give two files: that of the cameras (cam0, cam1, ...) and that of the "
-        "IMU");
+        "IMU{}",
+        imu_files > 1 ? ", or three if each of two IMUs has one" : ""));
   }
   return result;
 }
@@ -115,6 +128,7 @@ ImuNoise ReadChainNoise(const YAML::Node& imu) {
 }
 
 std::string ChainNoiseText(const ImuNoise& noise,
+                           int imu,
                            double rate_hz,
                            const std::string& indent) {
   return fmt::format(
@@ -124,13 +138,14 @@ std::string ChainNoiseText(const ImuNoise& noise,
       "{0}gyroscope_random_walk: {4}\n"
       "{0}update_rate: {5}\n"
       "{0}time_offset: 0.0\n"
-      "{0}rostopic: /imu0\n",
+      "{0}rostopic: /imu{6}\n",
       indent,
       NumberText(noise.accel_noise_density),
       NumberText(noise.accel_bias_random_walk),
       NumberText(noise.gyro_noise_density),
       NumberText(noise.gyro_bias_random_walk),
-      NumberText(rate_hz));
+      NumberText(rate_hz),
+      imu);
 }
 
 }  // namespace selfcal::client

@@ -12,14 +12,16 @@
 
 namespace selfcal::client {
 
-// The file with the cameras and the file with the IMU, found by their content.
-// FormatError unless both are given.
+// The file with the cameras and that with the IMU, found by their content.
 struct ChainFiles {
   YAML::Node cameras;
-  YAML::Node imu;             // the node imu0, or the whole file
-  bool several_imus = false;  // the file has imu1 as well
+  // imu0, imu1, ... of a file that has them; else the whole files, in their
+  // order. At least one.
+  std::vector<YAML::Node> imus;
 };
-ChainFiles ReadChainFiles(const std::vector<TextFile>& files);
+// FormatError unless there is one file of cameras and, besides, at least one
+// and at most `imu_files`.
+ChainFiles ReadChainFiles(const std::vector<TextFile>& files, int imu_files);
 
 // Reads and writes f, c, distortion, size and time offset of cam0, cam1, ...;
 // no extrinsics.
@@ -27,9 +29,11 @@ CameraCalibration ReadChainCamera(const YAML::Node& node);
 std::string ChainCameraText(const CameraCalibration& camera);
 
 // Reads and writes continuous-time noise densities, as selfcal has them; the
-// text has rate and topic as well, and `indent` before each line.
+// text has rate and topic as well, and `indent` before each line. `imu` is the
+// number of the IMU.
 ImuNoise ReadChainNoise(const YAML::Node& imu);
 std::string ChainNoiseText(const ImuNoise& noise,
+                           int imu,
                            double rate_hz,
                            const std::string& indent);
 

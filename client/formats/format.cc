@@ -19,14 +19,18 @@ namespace {
 
 struct Format {
   const char* name;
-  const char* files;
+  const char* files;  // of a rig with one IMU
   ImportedRig (*import)(const std::vector<TextFile>&, const FormatOptions&);
   ExportedFiles (*write)(const Rig&, const Calibration&, const FormatOptions&);
+  bool has_second_imu = false;
 };
 
 constexpr std::array kFormats = {
-    Format{
-        "kalibr", "camchain-imucam.yaml imu.yaml", ImportKalibr, ExportKalibr},
+    Format{"kalibr",
+           "camchain-imucam.yaml imu.yaml",
+           ImportKalibr,
+           ExportKalibr,
+           true},
     Format{"openvins",
            "kalibr_imucam_chain.yaml kalibr_imu_chain.yaml",
            ImportOpenVins,
@@ -128,7 +132,7 @@ absl::StatusOr<ExportedFiles> ExportRig(const std::string& format,
     const double reference_c = theta.reference_temperature_c;
     ExportedFiles result = (*found)->write(
         rig, WithPositiveFov(AtTemperature(theta, reference_c)), options);
-    if (theta.imu1) {
+    if (theta.imu1 && !(*found)->has_second_imu) {
       result.losses.push_back(
           {"imu1",
            fmt::format("these files of {} have one IMU, the first: omitted",

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
+#include <vector>
 
 #include "client/formats/camera_chain.h"
 #include "client/formats/format_error.h"
@@ -14,14 +16,41 @@
 namespace selfcal::client {
 namespace {
 
-void CheckReference(const YAML::Node& imu) {
-  if (Has(imu, "T_i_b") && !GetMatrix(imu, "T_i_b", 4, 4).isIdentity(1e-9)) {
+// The IMU whose frame is that of the body, and another one if there is one.
+struct FoundImus {
+  YAML::Node reference;
+  std::optional<YAML::Node> second;
+};
+
+FoundImus FindImus(const ChainFiles& chain, std::vector<Loss>* losses) {
+  std::vector<YAML::Node> references, others;
+  for (const YAML::Node& imu : chain.imus) {
+    const bool reference =
+        !Has(imu, "T_i_b") || GetMatrix(imu, "T_i_b", 4, 4).isIdentity(1e-9);
+    (reference ? references : others).push_back(imu);
+  }
+  if (references.empty()) {
     throw FormatError(
         "T_i_b is not the identity: use the file with imu0, the reference");
   }
-  if (GetDouble(imu, "time_offset", 0) != 0) {
+  if (references.size() > 1) {
+    throw FormatError(
+        "several IMUs are the reference, as they have no T_i_b or the "
+        "identity: use the files that kalibr has written, or leave out the "
+        "second one");
+  }
+  if (GetDouble(references.front(), "time_offset", 0) != 0) {
     throw FormatError("time_offset of imu0 is not 0");
   }
+  if (others.size() > 1) {
+    losses->push_back({"imu2",
+                       fmt::format("there are {} IMUs, of which the first two "
+                                   "are read: omitted",
+                                   chain.imus.size()),
+                       true});
+  }
+  if (others.empty()) return {references.front(), std::nullopt};
+  return {references.front(), others.front()};
 }
 
 // Keys of the positions of the axes in I.
@@ -48,9 +77,12 @@ void AddPositionsLoss(const std::string& name,
        true});
 }
 
-// Reads the IMU's matrices; without them, readings are used as they are. A
-// result of the model "calibrated" repeats those of its input, unused.
-ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
+// Reads an IMU's matrices; without them, readings are used as they are. A
+// result of the model "calibrated" repeats those of its input, unused. Names of
+// losses begin with `prefix`.
+ImuMatrices ReadMatrices(const std::string& prefix,
+                         const YAML::Node& imu,
+                         std::vector<Loss>* losses) {
   ImuMatrices result{Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};
   if (!Has(imu, "gyroscopes") ||
       (Has(imu, "model") && GetText(imu, "model") == "calibrated")) {
@@ -67,8 +99,40 @@ ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
     if (!Has(accel, kPositions[axis])) continue;
     result.r.col(axis) = GetMatrix(accel, kPositions[axis], 3, 1);
   }
-  AddPositionsLoss("accelerometers.M", result, losses);
+  AddPositionsLoss(prefix + "accelerometers.M", result, losses);
   return result;
+}
+
+// Reads the second IMU; R_IB is of the first.
+void ReadSecondImu(const YAML::Node& imu,
+                   const Eigen::Matrix3d& R_IB,
+                   ImportedRig* result) {
+  const ImuInBody own =
+      FromMatrices(ReadMatrices("imu1.", imu, &result->losses));
+  // J is the frame of its gyroscope, K that of its accelerometer.
+  const Eigen::Matrix3d& R_JK = own.R_IB;
+  const Eigen::Matrix4d T_KB = Rigid(GetMatrix(imu, "T_i_b", 4, 4), "T_i_b");
+  SecondImuCalibration& imu1 = result->rig.factory.imu1.emplace();
+  static_cast<ImuCalibration&>(imu1) = own.imu;
+  imu1.q_JI =
+      Eigen::Quaterniond(R_JK * T_KB.topLeftCorner<3, 3>() * R_IB.transpose())
+          .normalized();
+  imu1.p_JI = R_JK * T_KB.topRightCorner<3, 1>();
+  result->rig.imu1_noise = ReadChainNoise(imu);
+  result->losses.push_back(
+      {"imu1.T_i_b",
+       "is read as the transform from body to IMU that kalibr writes since "
+       "August 2022; before, it wrote the position of the IMU in the body into "
+       "it",
+       false});
+  const double offset_s = GetDouble(imu, "time_offset", 0);
+  if (offset_s == 0) return;
+  result->losses.push_back(
+      {"imu1.time_offset",
+       fmt::format("both IMUs of selfcal are on one clock: add {} s to the "
+                   "timestamps of the second one",
+                   offset_s),
+       true});
 }
 
 // Kalibr's loader stops at values below 0 of a principal point, and of some
@@ -95,8 +159,69 @@ void CheckCamera(std::size_t number, const CameraCalibration& camera) {
                   camera.c.y()));
 }
 
-void AddMatricesLoss(const ImuCalibration& imu, std::vector<Loss>* losses) {
-  if (IsNominal(imu)) return;
+std::string ImuText(const AccelFrame& body,
+                    const std::string& noise,
+                    bool has_positions) {
+  const Factors gyro = LowerFactors(body.matrices.G);
+  std::string positions;
+  for (int axis = 0; has_positions && axis < 3; ++axis) {
+    const Eigen::Vector3d r = body.matrices.r.col(axis);
+    positions +=
+        fmt::format("  {}: {}\n", kPositions[axis], ListText({r.data(), 3}));
+  }
+  return fmt::format(
+      "{}"
+      "model: scale-misalignment{}\n"
+      "accelerometers:\n  M:\n{}{}"
+      "gyroscopes:\n  M:\n{}  A:\n{}  C_gyro_i:\n{}",
+      noise,
+      has_positions ? "-size-effect" : "",
+      RowsText(body.matrices.A, "  "),
+      positions,
+      RowsText(gyro.triangular, "  "),
+      RowsText(body.matrices.G_f * gyro.R.transpose(), "  "),
+      RowsText(gyro.R, "  "));
+}
+
+// The losses of an IMU, "imu" or "imu1".
+void AddImuLosses(const std::string& name,
+                  const ImuCalibration& imu,
+                  const AccelFrame& body,
+                  std::vector<Loss>* losses) {
+  if (imu.accel_position.size() > 0) {
+    AddPositionsLoss(name + ".accel.position", body.matrices, losses);
+  }
+  AddImuBlockLosses(
+      "kalibr", {"gyro.g_sensitivity", "accel.position"}, name, imu, losses);
+}
+
+// The file of the second IMU; R_BI is of the first.
+TextFile WriteSecondImu(const Rig& rig,
+                        const SecondImuCalibration& imu1,
+                        const Eigen::Matrix3d& R_BI,
+                        double rate_hz,
+                        std::vector<Loss>* losses) {
+  const AccelFrame own = ToAccelFrame(imu1);
+  Eigen::Matrix4d T_KB = Eigen::Matrix4d::Identity();
+  T_KB.topLeftCorner<3, 3>() =
+      own.R_BI * imu1.q_JI.normalized() * R_BI.transpose();
+  T_KB.topRightCorner<3, 1>() = own.R_BI * imu1.p_JI;
+  AddImuLosses("imu1", imu1, own, losses);
+  losses->push_back({"imu1.T_i_b",
+                     "kalibr writes it, but does not read it: with --imu "
+                     "imu.yaml imu1.yaml it begins at a rotation that it finds "
+                     "itself, without a distance",
+                     false});
+  return {"imu1.yaml",
+          fmt::format("T_i_b:\n{}{}",
+                      RowsText(T_KB, ""),
+                      ImuText(own,
+                              ChainNoiseText(rig.imu1_noise, 1, rate_hz, ""),
+                              imu1.accel_position.size() > 0))};
+}
+
+void AddMatricesLoss(const Calibration& theta, std::vector<Loss>* losses) {
+  if (IsNominal(theta.imu) && (!theta.imu1 || IsNominal(*theta.imu1))) return;
   losses->push_back(
       {"imu_matrices",
        "kalibr writes accelerometers.M, gyroscopes.M and C_gyro_i, A and "
@@ -110,19 +235,14 @@ void AddMatricesLoss(const ImuCalibration& imu, std::vector<Loss>* losses) {
 
 ImportedRig ImportKalibr(const std::vector<TextFile>& files,
                          const FormatOptions&) {
-  const ChainFiles chain = ReadChainFiles(files);
+  const ChainFiles chain = ReadChainFiles(files, 2);
   ImportedRig result;
-  CheckReference(chain.imu);
-  if (chain.several_imus) {
-    result.losses.push_back(
-        {"imu1",
-         "the file has several IMUs, of which the first is read: state the "
-         "second one in a file of the rig (factory.imu1, imu1_noise)",
-         true});
-  }
-  result.rig.imu_noise = ReadChainNoise(chain.imu);
-  const ImuInBody body = FromMatrices(ReadMatrices(chain.imu, &result.losses));
+  const FoundImus imus = FindImus(chain, &result.losses);
+  result.rig.imu_noise = ReadChainNoise(imus.reference);
+  const ImuInBody body =
+      FromMatrices(ReadMatrices("", imus.reference, &result.losses));
   result.rig.factory.imu = body.imu;
+  if (imus.second) ReadSecondImu(*imus.second, body.R_IB, &result);
   Eigen::Matrix4d T_CB;  // of the previous camera
   for (int j = 0; Has(chain.cameras, fmt::format("cam{}", j)); ++j) {
     const YAML::Node node = chain.cameras[fmt::format("cam{}", j)];
@@ -167,36 +287,18 @@ ExportedFiles ExportKalibr(const Rig& rig,
     chain += fmt::format("  rostopic: /cam{}/image_raw\n", j);
     before = T_CB;
   }
-  const Factors gyro = LowerFactors(body.matrices.G);
-  std::string positions;
-  if (theta.imu.accel_position.size() > 0) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::Vector3d r = body.matrices.r.col(axis);
-      positions +=
-          fmt::format("  {}: {}\n", kPositions[axis], ListText({r.data(), 3}));
-    }
-    AddPositionsLoss("imu.accel.position", body.matrices, &result.losses);
-  }
-  const std::string imu = fmt::format(
-      "{}"
-      "model: scale-misalignment{}\n"
-      "accelerometers:\n  M:\n{}{}"
-      "gyroscopes:\n  M:\n{}  A:\n{}  C_gyro_i:\n{}",
-      ChainNoiseText(
-          rig.imu_noise, ImuRate(options, "update_rate", &result.losses), ""),
-      positions.empty() ? "" : "-size-effect",
-      RowsText(body.matrices.A, "  "),
-      positions,
-      RowsText(gyro.triangular, "  "),
-      RowsText(body.matrices.G_f * gyro.R.transpose(), "  "),
-      RowsText(gyro.R, "  "));
-  AddMatricesLoss(theta.imu, &result.losses);
-  AddImuBlockLosses("kalibr",
-                    {"gyro.g_sensitivity", "accel.position"},
-                    theta.imu,
-                    &result.losses);
+  const double rate_hz = ImuRate(options, "update_rate", &result.losses);
+  const std::string imu = ImuText(body,
+                                  ChainNoiseText(rig.imu_noise, 0, rate_hz, ""),
+                                  theta.imu.accel_position.size() > 0);
+  AddMatricesLoss(theta, &result.losses);
+  AddImuLosses("imu", theta.imu, body, &result.losses);
   AddGravityLoss("kalibr", rig, &result.losses);
   result.files = {{"camchain-imucam.yaml", chain}, {"imu.yaml", imu}};
+  if (theta.imu1) {
+    result.files.push_back(
+        WriteSecondImu(rig, *theta.imu1, body.R_BI, rate_hz, &result.losses));
+  }
   return result;
 }
 

@@ -66,11 +66,12 @@ void AddImuLoss(const std::string& tool,
 
 void AddImuBlockLosses(const std::string& tool,
                        std::initializer_list<std::string_view> has,
+                       const std::string& name,
                        const ImuCalibration& imu,
                        std::vector<Loss>* losses) {
-  for (const std::string_view name : Corrections(imu)) {
-    if (Contains(kMatrixBlocks, name) || Contains(has, name)) continue;
-    losses->push_back({fmt::format("imu.{}", name),
+  for (const std::string_view block : Corrections(imu)) {
+    if (Contains(kMatrixBlocks, block) || Contains(has, block)) continue;
+    losses->push_back({fmt::format("{}.{}", name, block),
                        fmt::format("{} has no such correction: omitted", tool),
                        true});
   }

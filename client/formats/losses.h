@@ -21,9 +21,10 @@ void AddImuLoss(const std::string& tool,
 
 // For tools that correct readings by scales, misalignments, q_AI and the blocks
 // in `has`, named as in parameter_blocks.h ("gyro.g_sensitivity"): a loss for
-// each other block that corrects readings.
+// each other block that corrects readings. `name` is "imu" or "imu1".
 void AddImuBlockLosses(const std::string& tool,
                        std::initializer_list<std::string_view> has,
+                       const std::string& name,
                        const ImuCalibration& imu,
                        std::vector<Loss>* losses);
 

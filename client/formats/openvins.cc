@@ -62,10 +62,11 @@ Eigen::Matrix4d ReadExtrinsics(const YAML::Node& node) {
 
 ImportedRig ImportOpenVins(const std::vector<TextFile>& files,
                            const FormatOptions&) {
-  const ChainFiles chain = ReadChainFiles(files);
+  const ChainFiles chain = ReadChainFiles(files, 1);
+  const YAML::Node& imu = chain.imus.front();
   ImportedRig result;
-  result.rig.imu_noise = ReadChainNoise(chain.imu);
-  const ImuInBody body = FromMatrices(ReadMatrices(chain.imu));
+  result.rig.imu_noise = ReadChainNoise(imu);
+  const ImuInBody body = FromMatrices(ReadMatrices(imu));
   result.rig.factory.imu = body.imu;
   for (int j = 0; Has(chain.cameras, fmt::format("cam{}", j)); ++j) {
     const YAML::Node node = chain.cameras[fmt::format("cam{}", j)];
@@ -119,15 +120,17 @@ ExportedFiles ExportOpenVins(const Rig& rig,
       "  model: \"rpng\"\n"
       "  Tw:\n{}  R_IMUtoGYRO:\n{}  Ta:\n{}  R_IMUtoACC:\n{}  Tg:\n{}",
       RowsText(Eigen::Matrix4d::Identity(), "    "),
-      ChainNoiseText(
-          rig.imu_noise, ImuRate(options, "update_rate", &result.losses), "  "),
+      ChainNoiseText(rig.imu_noise,
+                     0,
+                     ImuRate(options, "update_rate", &result.losses),
+                     "  "),
       RowsText(theta.imu.T_g(), "    "),
       RowsText(Eigen::Matrix3d::Identity(), "    "),
       RowsText(theta.imu.T_a(), "    "),
       RowsText(theta.imu.q_AI.normalized().toRotationMatrix(), "    "),
       RowsText(theta.imu.T_s(), "    "));
   AddImuBlockLosses(
-      "openvins", {"gyro.g_sensitivity"}, theta.imu, &result.losses);
+      "openvins", {"gyro.g_sensitivity"}, "imu", theta.imu, &result.losses);
   AddSharedOffsetLosses("openvins", theta, &result.losses);
   AddLineDelayLosses("openvins", theta, &result.losses);
   AddTimeDriftLosses("openvins", theta, &result.losses);

@@ -45,6 +45,13 @@ struct Keyframe {
   std::vector<TrackPoint> points;
 };
 
+// The second IMU does not move the states: little may be known of its pose, and
+// a calibration uses it.
+Rig WithoutSecondImu(Rig rig) {
+  rig.factory.imu1.reset();
+  return rig;
+}
+
 // theta at the temperature of the recording.
 Calibration ThetaAt(const Calibration& theta, const OdometryOptions& options) {
   return AtTemperature(
@@ -60,7 +67,8 @@ class Odometry::Impl {
        const Calibration& theta,
        const OdometryOptions& options)
       : recording_(recording),
-        rig_(rig),
+        rig_(WithoutSecondImu(rig)),
+        has_second_imu_(rig.factory.imu1.has_value()),
         options_(options),
         sets_(ImageSets(*recording)),
         step_(KeyframeStep(sets_, options.keyframe_rate_hz)),
@@ -207,15 +215,19 @@ class Odometry::Impl {
   }
 
   bool Covered(std::int64_t t_ns) const {
-    const std::vector<ImuSample>& imu = recording_->imu();
-    return imu.front().t_ns <= t_ns && t_ns <= imu.back().t_ns;
+    const auto covers = [&](const std::vector<ImuSample>& imu) {
+      return !imu.empty() && imu.front().t_ns <= t_ns &&
+             t_ns <= imu.back().t_ns;
+    };
+    return covers(recording_->imu()) &&
+           (!has_second_imu_ || covers(recording_->imu1()));
   }
 
   // Readings from kImuPadding_s before the first keyframe to as long after the
   // last one, or to the first keyframe of the next segment.
-  std::vector<ImuSample> Readings(std::int64_t from_ns,
-                                  std::int64_t to_ns) const {
-    const std::vector<ImuSample>& imu = recording_->imu();
+  static std::vector<ImuSample> Readings(const std::vector<ImuSample>& imu,
+                                         std::int64_t from_ns,
+                                         std::int64_t to_ns) {
     const auto padding_ns = static_cast<std::int64_t>(1e9 * kImuPadding_s);
     const auto earlier = [](const ImuSample& sample, std::int64_t t_ns) {
       return sample.t_ns < t_ns;
@@ -253,8 +265,14 @@ class Odometry::Impl {
             : taken.back().t_ns;
     OdometrySegment result;
     const MotionSegment tracks = Assemble(taken, next_ns);
-    if (!before_ || !Continue(theta, tracks, &result)) {
-      Begin(theta, tracks, &result);
+    Calibration of_motion = theta;
+    of_motion.imu1.reset();
+    if (!before_ || !Continue(of_motion, tracks, &result)) {
+      Begin(of_motion, tracks, &result);
+    }
+    if (has_second_imu_) {
+      result.segment.imu1 =
+          Readings(recording_->imu1(), taken.front().t_ns, next_ns);
     }
     result.segment.calibration_version = version;
     ++index_;
@@ -268,7 +286,7 @@ class Odometry::Impl {
     segment.key = {options_.session, index_};
     segment.session_start_ns = SessionStart(sets_);
     segment.temperature_c = options_.temperature_c;
-    segment.imu = Readings(keyframes.front().t_ns, next_ns);
+    segment.imu = Readings(recording_->imu(), keyframes.front().t_ns, next_ns);
     std::map<std::uint64_t, int> seen;
     for (const Keyframe& keyframe : keyframes) {
       segment.keyframes.push_back({.t_ns = keyframe.t_ns});
@@ -339,7 +357,8 @@ class Odometry::Impl {
   }
 
   Recording* recording_;
-  const Rig rig_;
+  const Rig rig_;  // without the second IMU
+  const bool has_second_imu_;
   const OdometryOptions options_;
   const std::vector<ImageSet> sets_;
   const int step_;

@@ -4,7 +4,8 @@
 // Tracks are followed through all images (client/tracking), or are those of a
 // recording that has tracks instead of images; every n-th image is
 // a keyframe; the motion of each segment is estimated with the calibration that
-// the caller passes (core/motion), from where the segment before it ended.
+// the caller passes (core/motion), from where the segment before it ended, by
+// the first IMU; a second one that the rig has only adds its readings.
 // There is no map: a landmark lives as long as its track. A segment whose
 // motion cannot be found is returned without one, with the reason, and the next
 // one begins afresh. So does one after a gap of images.
@@ -61,8 +62,9 @@ struct OdometryProgress {
 
 class Odometry {
  public:
-  // The cameras of the rig are those of the recording, in this order. Tracks
-  // are predicted with theta. `recording` must outlive the object.
+  // The cameras of the rig are those of the recording, in this order, and a
+  // recording has readings of a second IMU if the rig has one. Tracks are
+  // predicted with theta. `recording` must outlive the object.
   Odometry(Recording* recording,
            const Rig& rig,
            const Calibration& theta,

@@ -207,14 +207,11 @@ class Selection {
     });
     const auto cameras = CameraTopics();
     if (!cameras.ok()) return cameras.status();
-    const auto imu = ImuTopicName();
-    if (!imu.ok()) return imu.status();
+    const auto imus = ImuTopicNames();
+    if (!imus.ok()) return imus.status();
     for (const std::string& name : *cameras) AddCamera(name);
-    ImuTopic& readings = topics_.imus.at(*imu);
-    const std::string where = fmt::format("{}: {}", path_, *imu);
-    ReportDamaged(where, readings.damaged, "readings");
-    SortByTime(where, &readings.samples, &data_.problems);
-    data_.imu = std::move(readings.samples);
+    data_.imu = TakeReadings(imus->front());
+    if (imus->size() > 1) data_.imu1 = TakeReadings(imus->back());
     return std::make_unique<BagRecording>(
         path_, std::move(data_), std::move(images_), std::move(files));
   }
@@ -254,10 +251,12 @@ class Selection {
     return names;
   }
 
-  absl::StatusOr<std::string> ImuTopicName() {
+  // That of the IMU, and of the second one if it is wanted.
+  absl::StatusOr<std::vector<std::string>> ImuTopicNames() {
     if (topics_.imus.empty()) return NotFound("readings of an IMU");
-    const std::string& name = options_.imu_topic;
-    if (!name.empty() && !topics_.imus.contains(name)) {
+    const std::vector<std::string>& names = options_.imu_topics;
+    for (const std::string& name : names) {
+      if (topics_.imus.contains(name)) continue;
       return absl::NotFoundError(
           fmt::format("{}: there are no readings in {}; topics with readings: "
                       "{}",
@@ -265,7 +264,11 @@ class Selection {
                       name,
                       Names(topics_.imus)));
     }
-    if (!name.empty()) return name;
+    if (names.size() > 2 || (names.size() == 2 && names[0] == names[1])) {
+      return absl::InvalidArgumentError(
+          "--imu-topic: state one topic, or two different ones for two IMUs");
+    }
+    if (!names.empty()) return names;
     if (topics_.imus.size() > 1) {
       return absl::InvalidArgumentError(
           fmt::format("{}: there are {} topics with readings of an IMU, {}: "
@@ -274,7 +277,15 @@ class Selection {
                       topics_.imus.size(),
                       Names(topics_.imus)));
     }
-    return topics_.imus.begin()->first;
+    return std::vector<std::string>{topics_.imus.begin()->first};
+  }
+
+  std::vector<ImuSample> TakeReadings(const std::string& topic) {
+    ImuTopic& readings = topics_.imus.at(topic);
+    const std::string where = fmt::format("{}: {}", path_, topic);
+    ReportDamaged(where, readings.damaged, "readings");
+    SortByTime(where, &readings.samples, &data_.problems);
+    return std::move(readings.samples);
   }
 
   // The reason may be that the file is damaged.

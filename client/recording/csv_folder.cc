@@ -40,9 +40,9 @@ absl::StatusOr<std::unique_ptr<Recording>> OpenCsvFolder(
     paths.push_back(std::move(listed->paths));
     data.cameras.push_back(std::move(camera));
   }
-  auto imu = ReadImuCsv(root / "imu.csv", &data.problems);
-  if (!imu.ok()) return imu.status();
-  data.imu = *std::move(imu);
+  const absl::Status read =
+      ReadImuLists(root / "imu.csv", root / "imu1.csv", &data);
+  if (!read.ok()) return read;
   return std::make_unique<ImageFileRecording>(std::move(data),
                                               std::move(paths));
 }

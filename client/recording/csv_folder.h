@@ -3,6 +3,7 @@
 //   cam0.csv, cam1.csv, ...   time [ns], name of the image's file
 //   imu.csv                   time [ns], gyroscope x y z [rad/s],
 //                             accelerometer x y z [m/s^2]
+//   imu1.csv                  the same of a second IMU, if there is one
 //
 // Names of files are relative to the folder. Lines that begin with # are
 // comments, and a first line that begins with a letter is a heading.

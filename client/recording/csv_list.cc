@@ -173,6 +173,19 @@ absl::StatusOr<std::vector<ImuSample>> ReadImuCsv(
   return imu;
 }
 
+absl::Status ReadImuLists(const fs::path& first,
+                          const fs::path& second,
+                          RecordedData* data) {
+  auto imu = ReadImuCsv(first, &data->problems);
+  if (!imu.ok()) return imu.status();
+  data->imu = *std::move(imu);
+  if (!IsFile(second)) return absl::OkStatus();
+  auto imu1 = ReadImuCsv(second, &data->problems);
+  if (!imu1.ok()) return imu1.status();
+  data->imu1 = *std::move(imu1);
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::vector<ListedPoint>> ReadTrackCsv(const fs::path& path) {
   std::vector<ListedPoint> points;
   const absl::Status read = ReadList(

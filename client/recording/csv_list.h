@@ -34,6 +34,12 @@ absl::StatusOr<ListedImages> ReadImageCsv(const std::filesystem::path& path,
 absl::StatusOr<std::vector<ImuSample>> ReadImuCsv(
     const std::filesystem::path& path, std::vector<std::string>* problems);
 
+// Reads the readings of the IMU into *data, and those of a second one if there
+// is a list of them.
+absl::Status ReadImuLists(const std::filesystem::path& first,
+                          const std::filesystem::path& second,
+                          RecordedData* data);
+
 struct ListedPoint {
   std::int64_t t_ns = 0;
   int camera = 0;

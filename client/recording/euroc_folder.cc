@@ -68,12 +68,24 @@ absl::Status AddCamera(const fs::path& folder,
 }
 
 // Poses of cameras are relative to the body until here.
-absl::Status DescribeImu(const fs::path& folder, RecordedData* data) {
-  const auto stated = ReadSensor(folder, &ParseImuYaml);
+absl::Status DescribeImus(const fs::path& first,
+                          const fs::path& second,
+                          RecordedData* data) {
+  const auto stated = ReadSensor(first, &ParseImuYaml);
   if (!stated.ok()) return stated.status();
-  if (!stated->has_value()) return absl::OkStatus();
-  const ImuYaml& imu = **stated;
+  const ImuYaml imu = stated->value_or(ImuYaml());
   data->imu_noise = imu.noise;
+  if (!data->imu1.empty()) {
+    const auto stated1 = ReadSensor(second, &ParseImuYaml);
+    if (!stated1.ok()) return stated1.status();
+    if (stated1->has_value()) {
+      data->imu1_noise = (*stated1)->noise;
+      const Eigen::Isometry3d T_JI = (*stated1)->T_BI.inverse() * imu.T_BI;
+      SecondImuCalibration& imu1 = data->imu1_calibration.emplace();
+      imu1.q_JI = Eigen::Quaterniond(T_JI.linear()).normalized();
+      imu1.p_JI = T_JI.translation();
+    }
+  }
   if (imu.T_BI.matrix().isIdentity(0)) return absl::OkStatus();
   const Eigen::Quaterniond q_BI =
       Eigen::Quaterniond(imu.T_BI.linear()).normalized();
@@ -107,10 +119,11 @@ absl::StatusOr<std::unique_ptr<Recording>> OpenEurocFolder(
     return absl::NotFoundError(
         fmt::format("{}: there is no folder cam0", root.string()));
   }
-  auto imu = ReadImuCsv(root / "imu0" / "data.csv", &data.problems);
-  if (!imu.ok()) return imu.status();
-  data.imu = *std::move(imu);
-  const absl::Status described = DescribeImu(root / "imu0", &data);
+  const fs::path first = root / "imu0", second = root / "imu1";
+  const absl::Status read =
+      ReadImuLists(first / "data.csv", second / "data.csv", &data);
+  if (!read.ok()) return read;
+  const absl::Status described = DescribeImus(first, second, &data);
   if (!described.ok()) return described;
   return std::make_unique<ImageFileRecording>(std::move(data),
                                               std::move(paths));

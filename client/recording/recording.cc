@@ -20,7 +20,9 @@ namespace selfcal::client {
 namespace fs = std::filesystem;
 
 void Recording::ShiftReadings(std::int64_t by_ns) {
-  for (ImuSample& sample : data_.imu) sample.t_ns += by_ns;
+  for (std::vector<ImuSample>* samples : {&data_.imu, &data_.imu1}) {
+    for (ImuSample& sample : *samples) sample.t_ns += by_ns;
+  }
 }
 
 absl::StatusOr<GreyPixels> Recording::Checked(absl::StatusOr<GreyPixels> pixels,

@@ -1,8 +1,8 @@
 // A recording of cameras and an IMU, in any container:
 //
 //   folder of EuRoC's format (Burri et al. 2016), TUM-VI's included
-//   folder of images with cam0.csv, cam1.csv, ... and imu.csv
-//   folder of tracks, without images, with tracks.csv and imu.csv
+//   folder of images with cam0.csv, cam1.csv, ... and imu.csv, imu1.csv
+//   folder of tracks, without images, with tracks.csv and imu.csv, imu1.csv
 //   bag of ROS 1
 //   bag of ROS 2, in MCAP or SQLite: a file, or the folder with metadata.yaml
 //
@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "client/recording/grey_pixels.h"
+#include "core/model/calibration.h"
 #include "core/model/camera.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
@@ -47,8 +48,11 @@ struct RecordedPoint {
 
 struct RecordedData {
   std::vector<RecordedCamera> cameras;  // at least one, each with an image
-  std::vector<ImuSample> imu;  // each later than the one before; at least one
-  std::optional<ImuNoise> imu_noise;  // that the recording states, if it does
+  std::vector<ImuSample> imu;   // each later than the one before; at least one
+  std::vector<ImuSample> imu1;  // of a second IMU, by the same clock
+  // That the recording states, if it does; of the second IMU with its pose.
+  std::optional<ImuNoise> imu_noise, imu1_noise;
+  std::optional<SecondImuCalibration> imu1_calibration;
   std::vector<std::string> problems;
 };
 
@@ -61,11 +65,17 @@ class Recording {
 
   const std::vector<RecordedCamera>& cameras() const { return data_.cameras; }
   const std::vector<ImuSample>& imu() const { return data_.imu; }
+  // Those of a second IMU; empty if there is none.
+  const std::vector<ImuSample>& imu1() const { return data_.imu1; }
   const std::optional<ImuNoise>& imu_noise() const { return data_.imu_noise; }
+  const std::optional<ImuNoise>& imu1_noise() const { return data_.imu1_noise; }
+  const std::optional<SecondImuCalibration>& imu1_calibration() const {
+    return data_.imu1_calibration;
+  }
   // Parts that were left out or repaired: a sentence each.
   const std::vector<std::string>& problems() const { return data_.problems; }
 
-  // Adds a time to the stamps of all readings, where cameras and IMU have
+  // Adds a time to the stamps of all readings, where cameras and IMUs have
   // clocks of their own.
   void ShiftReadings(std::int64_t by_ns);
 
@@ -114,7 +124,7 @@ std::optional<std::string> StampDifferences(const Recording& recording);
 // topic of images is a camera, in the order of their names.
 struct RecordingOptions {
   std::vector<std::string> camera_topics;  // in the order of the cameras
-  std::string imu_topic;
+  std::vector<std::string> imu_topics;     // of the first IMU, and the second
 };
 
 // Opens a recording, whose container is recognised by its content. NOT_FOUND if

@@ -106,9 +106,9 @@ absl::StatusOr<std::unique_ptr<Recording>> OpenTrackFolder(
         repeated,
         listed->size()));
   }
-  auto imu = ReadImuCsv(fs::path(folder) / "imu.csv", &data.problems);
-  if (!imu.ok()) return imu.status();
-  data.imu = *std::move(imu);
+  const absl::Status read = ReadImuLists(
+      fs::path(folder) / "imu.csv", fs::path(folder) / "imu1.csv", &data);
+  if (!read.ok()) return read;
   return std::make_unique<TrackRecording>(std::move(data), std::move(points));
 }
 

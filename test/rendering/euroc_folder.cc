@@ -46,25 +46,33 @@ std::string_view CameraModelOf(const CameraCalibration& camera) {
   return "pinhole";
 }
 
-std::string CameraYaml(const CameraCalibration& camera,
-                       const RenderOptions& options) {
-  const Eigen::Matrix3d R_IC = camera.q_CI.toRotationMatrix().transpose();
-  const Eigen::Vector3d p_IC = -(R_IC * camera.p_CI);
+// With the pose of a sensor S in the body, by T_SB.
+std::string PoseText(const Eigen::Quaterniond& q_SB,
+                     const Eigen::Vector3d& p_SB) {
+  const Eigen::Matrix3d R_BS = q_SB.conjugate().toRotationMatrix();
+  const Eigen::Vector3d p_BS = -(R_BS * p_SB);
   std::string rows;
   for (int i = 0; i < 3; ++i) {
     rows += fmt::format("{:.17g}, {:.17g}, {:.17g}, {:.17g},\n         ",
-                        R_IC(i, 0),
-                        R_IC(i, 1),
-                        R_IC(i, 2),
-                        p_IC[i]);
+                        R_BS(i, 0),
+                        R_BS(i, 1),
+                        R_BS(i, 2),
+                        p_BS[i]);
   }
   return fmt::format(
-      "sensor_type: camera\n"
-      "comment: rendered\n"
       "T_BS:\n"
       "  cols: 4\n"
       "  rows: 4\n"
-      "  data: [{}0.0, 0.0, 0.0, 1.0]\n"
+      "  data: [{}0.0, 0.0, 0.0, 1.0]\n",
+      rows);
+}
+
+std::string CameraYaml(const CameraCalibration& camera,
+                       const RenderOptions& options) {
+  return fmt::format(
+      "sensor_type: camera\n"
+      "comment: rendered\n"
+      "{}"
       "rate_hz: {}\n"
       "resolution: [{}, {}]\n"
       "camera_model: {}\n"
@@ -74,7 +82,7 @@ std::string CameraYaml(const CameraCalibration& camera,
       "time_offset_s: {:.17g}\n"
       "line_delay_s: {:.17g}\n"
       "exposure_s: {:.17g}\n",
-      rows,
+      PoseText(camera.q_CI, camera.p_CI),
       options.image_rate_hz,
       camera.width_px,
       camera.height_px,
@@ -99,8 +107,11 @@ constexpr std::string_view kBodyPose =
     "  data: [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0,\n"
     "         0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]\n";
 
-void WriteImu(const RenderedRecording& recording, const fs::path& folder) {
-  const ImuNoise& noise = recording.rig().imu_noise;
+void WriteImu(const ImuNoise& noise,
+              double rate_hz,
+              const ImuReadings& readings,
+              std::string_view pose,
+              const fs::path& folder) {
   WriteText(folder / "sensor.yaml",
             fmt::format("sensor_type: imu\n"
                         "comment: simulated\n"
@@ -110,8 +121,8 @@ void WriteImu(const RenderedRecording& recording, const fs::path& folder) {
                         "gyroscope_random_walk: {:.17g}\n"
                         "accelerometer_noise_density: {:.17g}\n"
                         "accelerometer_random_walk: {:.17g}\n",
-                        kBodyPose,
-                        recording.options().imu_rate_hz,
+                        pose,
+                        rate_hz,
                         noise.gyro_noise_density,
                         noise.gyro_bias_random_walk,
                         noise.accel_noise_density,
@@ -120,7 +131,7 @@ void WriteImu(const RenderedRecording& recording, const fs::path& folder) {
       "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],"
       "w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],"
       "a_RS_S_z [m s^-2]\n";
-  for (const ImuSample& sample : recording.imu().measured) {
+  for (const ImuSample& sample : readings.measured) {
     csv += fmt::format("{},{},{}\n",
                        kEurocEpoch_ns + sample.t_ns,
                        CsvNumbers(sample.gyro),
@@ -186,7 +197,19 @@ void WriteEurocFolder(const RenderedRecording& recording,
                       const std::function<void(int)>& written) {
   const fs::path mav = folder / "mav0";
   WriteTruth(recording.rig().factory, folder / "calibration.json");
-  WriteImu(recording, mav / "imu0");
+  const double rate_hz = recording.options().imu_rate_hz;
+  WriteImu(recording.rig().imu_noise,
+           rate_hz,
+           recording.imu(),
+           kBodyPose,
+           mav / "imu0");
+  if (recording.imu1()) {
+    WriteImu(recording.rig().imu1_noise,
+             rate_hz,
+             *recording.imu1(),
+             PoseText(stated.imu1->q_JI, stated.imu1->p_JI),
+             mav / "imu1");
+  }
   WriteStates(recording, mav / "state_groundtruth_estimate0");
   int images = 0;
   for (int j = 0; j < recording.cameras(); ++j) {

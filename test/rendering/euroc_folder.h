@@ -2,12 +2,13 @@
 // 2016), with its truth.
 //
 //   mav0/camN/data.csv, mav0/camN/data/STAMP.png, mav0/camN/sensor.yaml
-//   mav0/imu0/data.csv, mav0/imu0/sensor.yaml
+//   mav0/imu0/data.csv, mav0/imu0/sensor.yaml   and of imu1, if there is one
 //   mav0/state_groundtruth_estimate0/data.csv, .../sensor.yaml
 //   calibration.json      the truth, a selfcal.v1.CalibrationParameters
 //
-// The IMU is the body frame of the format. A camera's sensor.yaml has further
-// keys for what the format lacks: time_offset_s, line_delay_s, exposure_s.
+// The first IMU is the body frame of the format. A camera's sensor.yaml has
+// further keys for what the format lacks: time_offset_s, line_delay_s,
+// exposure_s.
 #pragma once
 
 #include <cstdint>

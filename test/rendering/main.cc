@@ -30,6 +30,7 @@ struct Arguments {
   double exposure_ms = 0;
   double line_delay_us = 0;
   bool twin = false;
+  bool second_imu = false;
   bool wrong_start = false;
   RenderOptions options;
 };
@@ -82,6 +83,9 @@ void Define(CLI::App* app, Arguments* arguments) {
   app->add_flag("--twin",
                 arguments->twin,
                 "With a second camera of the same kind, 11 cm to the right");
+  app->add_flag("--second-imu",
+                arguments->second_imu,
+                "With a second IMU, 5 cm from the first");
   app->add_option("--motion",
                   arguments->motion,
                   "handheld, mixed, rotation, or a TUM file of poses");
@@ -121,6 +125,7 @@ int Run(Arguments arguments) {
   options.exposure_s = arguments.exposure_ms * 1e-3;
   Rig rig = RigNamed(arguments.device);
   if (arguments.twin) rig = TwinRig(std::move(rig));
+  if (arguments.second_imu) AddSecondImu(&rig);
   if (arguments.line_delay_us > 0) {
     for (CameraCalibration& camera : rig.factory.cameras) {
       camera.line_delay_s = arguments.line_delay_us * 1e-6;

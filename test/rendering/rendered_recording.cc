@@ -50,6 +50,10 @@ RenderedRecording::RenderedRecording(
       scene_(MakeRoom(*trajectory_, options.scene, options.seed)),
       imu_(SimulateImu(
           rig, rig.factory.imu, *trajectory_, ImuOptions(options))) {
+  if (rig.factory.imu1) {
+    imu1_ = SimulateSecondImu(
+        rig, *rig.factory.imu1, *trajectory_, ImuOptions(options));
+  }
   for (const CameraCalibration& camera : rig_.factory.cameras) {
     renderers_.emplace_back(camera);
   }

@@ -1,5 +1,5 @@
 // A recording of a simulated device, with its truth: images of a room by every
-// camera of a rig, and the readings of its IMU.
+// camera of a rig, and the readings of its IMUs.
 //
 // Images are made when they are asked for, so that a recording of any length
 // needs no memory. Immutable; any thread may ask for images. The same rig,
@@ -43,6 +43,8 @@ class RenderedRecording {
   const Trajectory& trajectory() const { return *trajectory_; }
   const RenderOptions& options() const { return options_; }
   const ImuReadings& imu() const { return imu_; }
+  // Of the second IMU, if the rig has one.
+  const std::optional<ImuReadings>& imu1() const { return imu1_; }
   int cameras() const { return static_cast<int>(rig_.factory.cameras.size()); }
   int images() const { return static_cast<int>(stamps_ns_.size()); }
 
@@ -75,6 +77,7 @@ class RenderedRecording {
   RenderOptions options_;
   Scene scene_;
   ImuReadings imu_;
+  std::optional<ImuReadings> imu1_;
   std::vector<CameraRenderer> renderers_;
   std::vector<std::int64_t> stamps_ns_;
 };

@@ -18,6 +18,7 @@ RecordedData DataOf(const RenderedRecording& rendered) {
     data.cameras.push_back(std::move(camera));
   }
   data.imu = rendered.imu().measured;
+  if (rendered.imu1()) data.imu1 = rendered.imu1()->measured;
   return data;
 }
 

@@ -344,6 +344,40 @@ TEST(ExportKalibr, PositionsOfAxesReadBackAndAreSaidToBeInexact) {
       rig.factory, ReadAsTool("kalibr", one->files, kRate_hz), &random);
 }
 
+// Both IMUs measure the same body, with the distance between them.
+TEST(ExportKalibr, ASecondImuHasAFileOfItsOwn) {
+  RandomValues random(22);
+  for (int trial = 0; trial < 20; ++trial) {
+    Rig rig = RandomRig(kExpressible[0], &random);
+    rig.factory.imu1 = random.ThetaOfTwoImus().imu1;
+    rig.factory.imu1->accel_position.resize(0);
+    rig.imu1_noise = {2e-4, 3e-3, 4e-6, 5e-5};
+    const auto files = ExportRig("kalibr", rig, rig.factory, kOptions);
+    ASSERT_TRUE(files.ok()) << files.status();
+    EXPECT_THAT(LoaderFaults("kalibr", files->files), IsEmpty());
+    ASSERT_EQ(files->files.size(), 3u);
+    EXPECT_EQ(files->files[2].name, "imu1.yaml");
+    EXPECT_THAT(Names(files->losses), Contains("imu1.T_i_b"));
+    EXPECT_THAT(Names(files->losses), Not(Contains("imu1")));
+    const Tool tool = ReadAsTool("kalibr", files->files, kRate_hz);
+    ExpectSamePredictions(rig.factory, tool, &random);
+    ExpectSameSecondImu(rig.factory, tool, &random);
+
+    const auto again = ImportRig("kalibr", files->files, kOptions);
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_EQ(Names(again->losses), std::vector<std::string>{"imu1.T_i_b"});
+    ASSERT_TRUE(SameShape(again->rig.factory, rig.factory));
+    const Eigen::VectorXd difference =
+        BoxMinus(again->rig.factory, rig.factory);
+    ExpectSameNoise(again->rig.imu1_noise, rig.imu1_noise);
+    int fov = 0;  // whose w is written as its magnitude
+    for (const CameraCalibration& camera : rig.factory.cameras) {
+      fov += camera.model == Model::kFov ? 1 : 0;
+    }
+    EXPECT_LE((difference.array().abs() > 1e-9).count(), fov);
+  }
+}
+
 TEST_P(Export, NothingIsLostOfANominalDevice) {
   RandomValues random(10);
   Rig rig;

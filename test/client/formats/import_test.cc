@@ -358,6 +358,7 @@ TEST(ImportErrors, NameTheFieldAndWhatToDo) {
            {"kalibr", "190.9", "-1", "must be positive"},
            {"kalibr", "time_offset: 0.0", "time_offset: 0.1", "time_offset"},
            {"kalibr", "gyroscope_noise", "x", "gyroscope_noise_density"},
+           {"kalibr", "imu0:", "imu1: {}\nimu0:", "several IMUs"},
            {"openvins", "\"kalibr\"", "\"rpng\"", "not upper triangular"},
            {"openvins", "\"kalibr\"", "\"imu\"", "model 'imu'"},
            {"openvins", "T_cam_imu", "x", "'T_imu_cam' is missing"},
@@ -538,6 +539,28 @@ TEST(ImportLosses, HaveAName) {
     ASSERT_EQ(rig->losses.size(), 1u) << change.answer;
     EXPECT_EQ(rig->losses[0].name, change.answer);
   }
+}
+
+// Kalibr's result on two IMUs: one file, with a delay that selfcal lacks.
+TEST(ImportLosses, TheDelayOfASecondImuIsOne) {
+  RandomValues random(24);
+  std::vector<TextFile> files = KalibrFiles(&random);
+  const Matrix4d T_KB = RandomTransform(&random);
+  files[1].text += fmt::format(
+      "imu1:\n  T_i_b: {}\n{}  time_offset: 0.002\n", Rows(T_KB), kNoise);
+  const auto rig = ImportRig("kalibr", files, {});
+  ASSERT_TRUE(rig.ok()) << rig.status();
+  ASSERT_TRUE(rig->rig.factory.imu1);
+  EXPECT_NEAR(rig->rig.factory.imu1->p_JI.norm(),
+              (T_KB.topRightCorner<3, 1>().norm()),
+              1e-9);
+  EXPECT_EQ(Names(rig->losses),
+            (std::vector<std::string>{"imu1.T_i_b", "imu1.time_offset"}));
+  EXPECT_TRUE(rig->losses[1].changes_prediction);
+  files[1].text += fmt::format("imu2:\n  T_i_b: {}\n{}", Rows(T_KB), kNoise);
+  const auto three = ImportRig("kalibr", files, {});
+  ASSERT_TRUE(three.ok()) << three.status();
+  EXPECT_EQ(three->losses[0].name, "imu2");
 }
 
 // Tracks are in the raw image: its rectification says nothing about them.

@@ -95,6 +95,8 @@ inline constexpr Key kKalibrImu[] = {
     {"gyroscopes.M", Type::kRows, Use::kUnread, 3, 3},
     {"gyroscopes.A", Type::kRows, Use::kUnread, 3, 3},
     {"gyroscopes.C_gyro_i", Type::kRows, Use::kUnread, 3, 3}};
+inline constexpr Key kKalibrSecondImu[] = {
+    {"T_i_b", Type::kRows, Use::kUnread, 4, 4}};
 
 // VioManagerOptions.h, StateOptions.h and ROS1Visualizer.cpp.
 inline constexpr Key kOpenVinsCamera[] = {

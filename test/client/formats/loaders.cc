@@ -216,6 +216,9 @@ void CheckKalibr(const std::vector<TextFile>& files, Checker* checker) {
     ++number;
   }
   checker->Check(files[1].name, Yaml(files[1]), Joined({kKalibrImu}));
+  if (files.size() < 3) return;
+  checker->Check(
+      files[2].name, Yaml(files[2]), Joined({kKalibrImu, kKalibrSecondImu}));
 }
 
 void CheckOpenVins(const std::vector<TextFile>& files, Checker* checker) {

@@ -61,6 +61,36 @@ inline void ExpectSamePredictions(const Calibration& theta,
   }
 }
 
+// What both make of the readings of the second IMU, against the first.
+inline void ExpectSameSecondImu(const Calibration& theta,
+                                const Tool& tool,
+                                RandomValues* random) {
+  ASSERT_TRUE(tool.correct_second);
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  const Eigen::Matrix3d R_IJ =
+      theta.imu1->q_JI.conjugate().normalized().toRotationMatrix();
+  const Eigen::Vector3d r_I = -R_IJ * theta.imu1->p_JI;
+  for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::Vector3d gyro = 2 * random->Direction();
+    const Eigen::Vector3d accel = 10 * random->Direction();
+    const BodyRates first = CorrectImu(theta.imu, gyro, accel, zero, zero);
+    const ToolRates its_first = tool.correct(gyro, accel);
+    Eigen::Matrix3d ours_basis;
+    ours_basis << first.w_I, first.f_I, first.w_I.cross(first.f_I);
+    Eigen::Matrix3d its_basis;
+    its_basis << its_first.w_B, its_first.f_B,
+        its_first.w_B.cross(its_first.f_B);
+    if (std::abs(ours_basis.determinant()) < 1) continue;  // nearly parallel
+    const Eigen::Matrix3d R_BI = its_basis * ours_basis.inverse();
+    const BodyRates second = CorrectImu(*theta.imu1, gyro, accel, zero, zero);
+    const Eigen::Vector3d w_I = R_IJ * second.w_I;
+    const Eigen::Vector3d f_I = R_IJ * second.f_I - w_I.cross(w_I.cross(r_I));
+    const ToolRates its_second = tool.correct_second(gyro, accel);
+    EXPECT_LT((its_second.w_B - R_BI * w_I).norm(), 1e-8);
+    EXPECT_LT((its_second.f_B - R_BI * f_I).norm(), 1e-7);
+  }
+}
+
 inline void ExpectSameNoise(const ImuNoise& a, const ImuNoise& b) {
   EXPECT_DOUBLE_EQ(a.gyro_noise_density, b.gyro_noise_density);
   EXPECT_DOUBLE_EQ(a.accel_noise_density, b.accel_noise_density);

@@ -135,14 +135,9 @@ Projection KalibrCamera(const YAML::Node& cam) {
 }
 
 // Kalibr's wiki, "Yaml formats", and the residuals of its scale-misalignment
-// model of the IMU.
-Tool Kalibr(const std::vector<TextFile>& files) {
-  Tool tool;
-  tool.has_imu_model = true;
-  const YAML::Node chain = Yaml(files[0].text);
-  // The input of Kalibr is the content of imu0 in its result.
-  const YAML::Node root = Yaml(files[1].text);
-  const YAML::Node imu = root["imu0"] ? root["imu0"] : root;
+// model of the IMU. Rates in the frame of the IMU.
+std::function<ToolRates(const Vector3d&, const Vector3d&)> KalibrRates(
+    const YAML::Node& imu) {
   const Matrix3d Ma = Mat<3>(imu["accelerometers"]["M"]);
   const Matrix3d Mg = Mat<3>(imu["gyroscopes"]["M"]);
   const Matrix3d C = Mat<3>(imu["gyroscopes"]["C_gyro_i"]);
@@ -159,7 +154,7 @@ Tool Kalibr(const std::vector<TextFile>& files) {
   }
   // The rate is constant. Its forces are at the origin, so that A is exact only
   // where r is zero.
-  tool.correct = [=](const Vector3d& gyro, const Vector3d& accel) -> ToolRates {
+  return [=](const Vector3d& gyro, const Vector3d& accel) -> ToolRates {
     const Vector3d read = Ma.inverse() * accel;
     const Vector3d w = C.inverse() * (Mg.inverse() * (gyro - A * (C * read)));
     Vector3d f = read;
@@ -168,6 +163,28 @@ Tool Kalibr(const std::vector<TextFile>& files) {
     }
     return {w, f};
   };
+}
+
+Tool Kalibr(const std::vector<TextFile>& files) {
+  Tool tool;
+  tool.has_imu_model = true;
+  const YAML::Node chain = Yaml(files[0].text);
+  // The input of Kalibr is the content of imu0 in its result.
+  const YAML::Node root = Yaml(files[1].text);
+  const YAML::Node imu = root["imu0"] ? root["imu0"] : root;
+  tool.correct = KalibrRates(imu);
+  if (files.size() > 2) {
+    const YAML::Node second = Yaml(files[2].text);
+    const Matrix4d T_KB = Mat<4>(second["T_i_b"]);
+    const Matrix3d R_BK = T_KB.topLeftCorner<3, 3>().transpose();
+    const Vector3d r_B = -R_BK * T_KB.topRightCorner<3, 1>();
+    const auto rates = KalibrRates(second);
+    tool.correct_second = [=](const Vector3d& gyro, const Vector3d& accel) {
+      const ToolRates at_K = rates(gyro, accel);
+      const Vector3d w_B = R_BK * at_K.w_B;
+      return ToolRates{w_B, R_BK * at_K.f_B - w_B.cross(w_B.cross(r_B))};
+    };
+  }
   tool.noise = {
       .gyro_noise_density = imu["gyroscope_noise_density"].as<double>(),
       .accel_noise_density = imu["accelerometer_noise_density"].as<double>(),

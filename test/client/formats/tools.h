@@ -30,6 +30,10 @@ struct Tool {
                           const Eigen::Vector3d& accel)>
       correct;
   bool has_imu_model = false;
+  // The rates of the body, at its origin, by the readings of a second IMU.
+  std::function<ToolRates(const Eigen::Vector3d& gyro,
+                          const Eigen::Vector3d& accel)>
+      correct_second;
   std::vector<ToolCamera> cameras;
   ImuNoise noise;  // densities
 };

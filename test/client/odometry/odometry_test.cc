@@ -16,6 +16,7 @@
 #include "client/tracking/feature_tracker.h"
 #include "core/calibration/calibrate.h"
 #include "core/calibration/theta_prior.h"
+#include "core/model/so3.h"
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
 #include "test/rendering/rendered_source.h"
@@ -27,9 +28,15 @@ namespace {
 
 constexpr double kSeconds = 10;
 
+Rig RigOfTwoImus() {
+  Rig rig = HandheldRig("handheld");
+  AddSecondImu(&rig);
+  return rig;
+}
+
 const RenderedRecording& Rendered() {
   static const auto& rendered = *new RenderedRecording(
-      HandheldRig("handheld"), MakeHandheld(kSeconds, 1, 5), RenderOptions{});
+      RigOfTwoImus(), MakeHandheld(kSeconds, 1, 5), RenderOptions{});
   return rendered;
 }
 
@@ -77,6 +84,7 @@ class Source : public Recording {
       data.cameras[0].image_times_ns.push_back(Rendered().stamp_ns(i));
     }
     data.imu = Rendered().imu().measured;
+    data.imu1 = Rendered().imu1()->measured;
     return data;
   }
 
@@ -84,8 +92,8 @@ class Source : public Recording {
 };
 
 std::vector<OdometrySegment> All(Recording* source,
-                                 const OdometryOptions& options) {
-  const Rig rig = HandheldRig("handheld");
+                                 const OdometryOptions& options,
+                                 const Rig& rig = HandheldRig("handheld")) {
   Odometry odometry(source, rig, rig.factory, options);
   std::vector<OdometrySegment> segments;
   for (;;) {
@@ -128,7 +136,8 @@ TEST(Odometry, FindsTheMotionOfARecording) {
     EXPECT_GT(segment.observations.size(), 3000u);
     EXPECT_LT(segments[i].reprojection_rms_px, 0.5);
     EXPECT_LT(PathError_m(segment), 0.01);
-    EXPECT_TRUE(Validate(segment, Rendered().rig().factory).empty());
+    EXPECT_TRUE(segment.imu1.empty());
+    EXPECT_TRUE(Validate(segment, HandheldRig("handheld").factory).empty());
   }
   // Neighbours can be joined, and are in one frame.
   for (std::size_t i = 1; i < segments.size(); ++i) {
@@ -136,6 +145,26 @@ TEST(Odometry, FindsTheMotionOfARecording) {
     EXPECT_GE(segments[i - 1].segment.imu.back().t_ns, next.t_ns);
     const KeyframeState& last = segments[i - 1].segment.keyframes.back();
     EXPECT_LT((next.p_GI - last.p_GI).norm(), 0.3);
+  }
+}
+
+// Whatever is known of its pose.
+TEST(Odometry, ASecondImuAddsItsReadingsAndDoesNotMoveTheStates) {
+  Source source;
+  const OdometryOptions options = {.session = "walk", .keyframes = 30};
+  Rig rig = RigOfTwoImus();
+  rig.factory.imu1->q_JI = Exp({0.1, 0, 0}) * rig.factory.imu1->q_JI;
+  const auto with = All(&source, options, rig);
+  const auto without = All(&source, options);
+  ASSERT_EQ(with.size(), without.size());
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    const MotionSegment& segment = with[i].segment;
+    EXPECT_EQ(segment.keyframes.back().p_GI,
+              without[i].segment.keyframes.back().p_GI);
+    ASSERT_FALSE(segment.imu1.empty());
+    EXPECT_LE(segment.imu1.front().t_ns, segment.imu.front().t_ns + 5'000'000);
+    EXPECT_GE(segment.imu1.back().t_ns, segment.keyframes.back().t_ns);
+    EXPECT_TRUE(Validate(segment, rig.factory).empty());
   }
 }
 

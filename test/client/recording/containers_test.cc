@@ -227,9 +227,22 @@ TEST(BagTopics, TwoImusAreAnErrorUntilOneIsStated) {
             PathOf("two_imus.mcap") +
                 ": there are 2 topics with readings of an IMU, /imu0, /imu1: "
                 "state one with --imu-topic");
-  const auto recording = Open("two_imus.mcap", {{}, "/imu1"});
+  const auto recording = Open("two_imus.mcap", {{}, {"/imu1"}});
   ASSERT_TRUE(recording.ok()) << recording.status();
   ExpectTrueReadings(**recording);
+  EXPECT_THAT((*recording)->imu1(), IsEmpty());
+}
+
+TEST(BagTopics, TheSecondOneThatIsStatedIsOfASecondImu) {
+  const auto recording = Open("two_imus.mcap", {{}, {"/imu1", "/imu0"}});
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  ExpectTrueReadings(**recording);
+  ASSERT_EQ((*recording)->imu1().size(), kReadings);
+  EXPECT_EQ((*recording)->imu1().back().gyro, (*recording)->imu().back().gyro);
+  EXPECT_THAT(ErrorOf("two_imus.mcap", {{}, {"/imu0", "/imu0"}}),
+              HasSubstr("two different ones"));
+  EXPECT_THAT(ErrorOf("two_imus.mcap", {{}, {"/imu0", "/imu2"}}),
+              HasSubstr("there are no readings in /imu2"));
 }
 
 TEST(BagTopics, MissingOnesAreNamed) {
@@ -237,11 +250,11 @@ TEST(BagTopics, MissingOnesAreNamed) {
             PathOf("no_imu.mcap") + ": there are no readings of an IMU in it");
   EXPECT_EQ(ErrorOf("no_images.mcap"),
             PathOf("no_images.mcap") + ": there are no images in it");
-  EXPECT_EQ(ErrorOf("none.mcap", {{"/left"}, ""}),
+  EXPECT_EQ(ErrorOf("none.mcap", {{"/left"}, {}}),
             PathOf("none.mcap") +
                 ": there are no images in /left; topics with images: "
                 "/cam0/image_raw, /cam1/image_raw");
-  EXPECT_EQ(ErrorOf("none.mcap", {{}, "/imu"}),
+  EXPECT_EQ(ErrorOf("none.mcap", {{}, {"/imu"}}),
             PathOf("none.mcap") +
                 ": there are no readings in /imu; topics with readings: /imu0");
 }

@@ -47,6 +47,25 @@ TEST_F(CsvFolder, HasHeadingsCommentsAndNamesWithoutExtension) {
             folder_.File("a.png") + ": neither a PNG nor a JPEG");
 }
 
+TEST_F(CsvFolder, ASecondImuHasAListOfItsOwn) {
+  const auto one = OpenRecording(folder_.path(), {});
+  ASSERT_TRUE(one.ok()) << one.status();
+  EXPECT_TRUE((*one)->imu1().empty());
+  Write("imu1.csv", "700,1,2,3,4,5,7\n600,1,2,3,4,5,6\n");
+  const auto two = OpenRecording(folder_.path(), {});
+  ASSERT_TRUE(two.ok()) << two.status();
+  ASSERT_EQ((*two)->imu1().size(), 2u);
+  EXPECT_EQ((*two)->imu1()[0].t_ns, 600);
+  EXPECT_EQ((*two)->imu1()[1].accel.z(), 7);
+  EXPECT_EQ((*two)->problems().size(), 1u);
+  (*two)->ShiftReadings(50);
+  EXPECT_EQ((*two)->imu1()[0].t_ns, 650);
+  EXPECT_EQ((*two)->imu()[0].t_ns, 550);
+  Write("imu1.csv", "x");
+  EXPECT_EQ(Error().substr(0, folder_.File("imu1.csv").size()),
+            folder_.File("imu1.csv"));
+}
+
 TEST_F(CsvFolder, FurtherCamerasAreNumbered) {
   Write("cam1.csv", "1000,a.png\n");
   Write("cam3.csv", "1000,a.png\n");

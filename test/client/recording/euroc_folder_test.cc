@@ -186,6 +186,36 @@ TEST_F(EurocReader, StatesTheNoiseOfTheImuAndItsPlaceInTheBody) {
   EXPECT_LT((a - b).norm(), 1e-12);
 }
 
+TEST_F(EurocReader, ASecondImuHasReadingsNoiseAndAPose) {
+  Rig rig = HandheldRig("two");
+  AddSecondImu(&rig);
+  const RenderedRecording rendered(rig, MakeHandheld(0.2, 1, 1), {});
+  WriteEurocFolder(rendered, rig.factory, copy_.path());
+  const auto recording = OpenRecording(copy_.path(), {});
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  const auto& written = rendered.imu1()->measured;
+  ASSERT_EQ((*recording)->imu1().size(), written.size());
+  EXPECT_EQ((*recording)->imu1()[3].gyro, written[3].gyro);
+  EXPECT_EQ((*recording)->imu1_noise()->accel_noise_density,
+            rig.imu1_noise.accel_noise_density);
+  const SecondImuCalibration& read = *(*recording)->imu1_calibration();
+  EXPECT_LT(read.q_JI.angularDistance(rig.factory.imu1->q_JI), 1e-9);
+  EXPECT_LT((read.p_JI - rig.factory.imu1->p_JI).norm(), 1e-9);
+
+  // In a body that is not the first IMU, both move with it.
+  const fs::path yaml = copy_.path() / "mav0" / "imu0" / "sensor.yaml";
+  WriteBytes(yaml,
+             "T_BS:\n  data: [0.0, -1.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.2,\n"
+             "         0.0, 0.0, 1.0, 0.3, 0.0, 0.0, 0.0, 1.0]\n");
+  const auto moved = OpenRecording(copy_.path(), {});
+  ASSERT_TRUE(moved.ok()) << moved.status();
+  const SecondImuCalibration& in_I = *(*moved)->imu1_calibration();
+  const Eigen::Vector3d a = in_I.q_JI * Eigen::Vector3d(1, 2, 3) + in_I.p_JI;
+  const Eigen::Vector3d b =
+      read.q_JI * Eigen::Vector3d(-1.9, 1.2, 3.3) + read.p_JI;
+  EXPECT_LT((a - b).norm(), 1e-12);
+}
+
 TEST_F(EurocReader, StampsOutOfOrderAreSorted) {
   const std::string first = Stamp(1) + "," + Stamp(1) + ".png\n";
   const std::string second = Stamp(2) + "," + Stamp(2) + ".png\n";
