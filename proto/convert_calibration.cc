@@ -305,6 +305,12 @@ Violations FromProto(const v1::CalibrationParameters& message,
            "is the pose of a second IMU; the first one defines the frame I and "
            "has none"});
     }
+    if (message.imu().time_offset_s() != 0) {
+      violations.push_back(
+          {prefix + "imu.time_offset_s",
+           "is that of a second IMU; the first one defines the clock and has "
+           "none"});
+    }
   } else {
     Require(false, prefix + "imu", &violations);
   }

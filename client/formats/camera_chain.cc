@@ -129,6 +129,7 @@ ImuNoise ReadChainNoise(const YAML::Node& imu) {
 
 std::string ChainNoiseText(const ImuNoise& noise,
                            int imu,
+                           double time_offset_s,
                            double rate_hz,
                            const std::string& indent) {
   return fmt::format(
@@ -137,7 +138,7 @@ std::string ChainNoiseText(const ImuNoise& noise,
       "{0}gyroscope_noise_density: {3}\n"
       "{0}gyroscope_random_walk: {4}\n"
       "{0}update_rate: {5}\n"
-      "{0}time_offset: 0.0\n"
+      "{0}time_offset: {7}\n"
       "{0}rostopic: /imu{6}\n",
       indent,
       NumberText(noise.accel_noise_density),
@@ -145,7 +146,8 @@ std::string ChainNoiseText(const ImuNoise& noise,
       NumberText(noise.gyro_noise_density),
       NumberText(noise.gyro_bias_random_walk),
       NumberText(rate_hz),
-      imu);
+      imu,
+      NumberText(time_offset_s));
 }
 
 }  // namespace selfcal::client

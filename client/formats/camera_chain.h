@@ -30,10 +30,11 @@ std::string ChainCameraText(const CameraCalibration& camera);
 
 // Reads and writes continuous-time noise densities, as selfcal has them; the
 // text has rate and topic as well, and `indent` before each line. `imu` is the
-// number of the IMU.
+// number of the IMU, and its time offset t_imu0 - t_imu.
 ImuNoise ReadChainNoise(const YAML::Node& imu);
 std::string ChainNoiseText(const ImuNoise& noise,
                            int imu,
+                           double time_offset_s,
                            double rate_hz,
                            const std::string& indent);
 

@@ -125,14 +125,7 @@ void ReadSecondImu(const YAML::Node& imu,
        "August 2022; before, it wrote the position of the IMU in the body into "
        "it",
        false});
-  const double offset_s = GetDouble(imu, "time_offset", 0);
-  if (offset_s == 0) return;
-  result->losses.push_back(
-      {"imu1.time_offset",
-       fmt::format("both IMUs of selfcal are on one clock: add {} s to the "
-                   "timestamps of the second one",
-                   offset_s),
-       true});
+  imu1.time_offset_s = GetDouble(imu, "time_offset", 0);
 }
 
 // Kalibr's loader stops at values below 0 of a principal point, and of some
@@ -208,16 +201,19 @@ TextFile WriteSecondImu(const Rig& rig,
   T_KB.topRightCorner<3, 1>() = own.R_BI * imu1.p_JI;
   AddImuLosses("imu1", imu1, own, losses);
   losses->push_back({"imu1.T_i_b",
-                     "kalibr writes it, but does not read it: with --imu "
-                     "imu.yaml imu1.yaml it begins at a rotation that it finds "
-                     "itself, without a distance",
+                     "kalibr writes it and time_offset, but does not read "
+                     "them: with --imu imu.yaml imu1.yaml it begins at a "
+                     "rotation and an offset that it finds itself, without a "
+                     "distance",
                      false});
   return {"imu1.yaml",
-          fmt::format("T_i_b:\n{}{}",
-                      RowsText(T_KB, ""),
-                      ImuText(own,
-                              ChainNoiseText(rig.imu1_noise, 1, rate_hz, ""),
-                              imu1.accel_position.size() > 0))};
+          fmt::format(
+              "T_i_b:\n{}{}",
+              RowsText(T_KB, ""),
+              ImuText(own,
+                      ChainNoiseText(
+                          rig.imu1_noise, 1, imu1.time_offset_s, rate_hz, ""),
+                      imu1.accel_position.size() > 0))};
 }
 
 void AddMatricesLoss(const Calibration& theta, std::vector<Loss>* losses) {
@@ -288,9 +284,10 @@ ExportedFiles ExportKalibr(const Rig& rig,
     before = T_CB;
   }
   const double rate_hz = ImuRate(options, "update_rate", &result.losses);
-  const std::string imu = ImuText(body,
-                                  ChainNoiseText(rig.imu_noise, 0, rate_hz, ""),
-                                  theta.imu.accel_position.size() > 0);
+  const std::string imu =
+      ImuText(body,
+              ChainNoiseText(rig.imu_noise, 0, 0, rate_hz, ""),
+              theta.imu.accel_position.size() > 0);
   AddMatricesLoss(theta, &result.losses);
   AddImuLosses("imu", theta.imu, body, &result.losses);
   AddGravityLoss("kalibr", rig, &result.losses);

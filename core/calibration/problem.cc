@@ -1,6 +1,8 @@
 #include "core/calibration/problem.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <map>
 #include <tuple>
@@ -17,6 +19,16 @@
 namespace selfcal {
 namespace {
 
+// Of the second IMU also those within the largest time offset.
+std::span<const ImuSample> SamplesOfLink(std::span<const ImuSample> samples,
+                                         int imu,
+                                         std::int64_t t0_ns,
+                                         std::int64_t t1_ns) {
+  const std::int64_t more_ns =
+      imu == 0 ? 0 : std::llround(1e9 * kMaxSecondOffset_s);
+  return SamplesBetween(samples, t0_ns - more_ns, t1_ns + more_ns);
+}
+
 void AddInertialLinks(const MotionSegment& segment,
                       int imu,
                       int first_keyframe,
@@ -26,12 +38,13 @@ void AddInertialLinks(const MotionSegment& segment,
                : SecondSamplesFromFirstKeyframe(segment);
   for (std::size_t k = 1; k < segment.keyframes.size(); ++k) {
     const int after = first_keyframe + static_cast<int>(k);
-    links->push_back(
-        {after - 1,
-         after,
-         SamplesBetween(
-             samples, segment.keyframes[k - 1].t_ns, segment.keyframes[k].t_ns),
-         imu});
+    links->push_back({after - 1,
+                      after,
+                      SamplesOfLink(samples,
+                                    imu,
+                                    segment.keyframes[k - 1].t_ns,
+                                    segment.keyframes[k].t_ns),
+                      imu});
   }
 }
 
@@ -164,9 +177,10 @@ CalibrationProblem FlattenSegments(
       problem.inertial_links.push_back(
           {after - 1,
            after,
-           SamplesBetween(imu == 0 ? before.imu : before.imu1,
-                          problem.keyframes[after - 1].t_ns,
-                          problem.keyframes[after].t_ns),
+           SamplesOfLink(imu == 0 ? before.imu : before.imu1,
+                         imu,
+                         problem.keyframes[after - 1].t_ns,
+                         problem.keyframes[after].t_ns),
            imu});
     }
     starts_chain[joint.after] = false;

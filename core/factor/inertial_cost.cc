@@ -1,4 +1,5 @@
 #include "core/factor/ceres_factors.h"
+#include "core/factor/imu_delay.h"
 #include "core/factor/quaternion_block.h"
 #include "core/factor/theta_block.h"
 #include "core/model/second_imu.h"
@@ -95,7 +96,15 @@ class InertialCost final : public ceres::CostFunction {
     by_imus.middleCols(first, J.theta.cols()) = J.theta;
     ByRotationOffset(d + first + kAccelRotation,
                      by_imus.middleCols<3>(first + kAccelRotation));
-    if (imu_ == 1) ByKeyframes(*theta.imu1, x0, x1, d, &J, &by_imus);
+    if (imu_ == 1) {
+      ByKeyframes(*theta.imu1, x0, x1, d, &J, &by_imus);
+      by_imus.rightCols<1>() = ResidualByDelay(samples_,
+                                               StateOfImu(theta, 1, x0),
+                                               StateOfImu(theta, 1, x1),
+                                               *theta.imu1,
+                                               noise_,
+                                               gravity_mps2_);
+    }
     if (double* out = jacobians[kTheta]) {
       Map<RowMajor15<Eigen::Dynamic>> by_theta(out, 15, theta_size_);
       by_theta.setZero();
@@ -108,14 +117,16 @@ class InertialCost final : public ceres::CostFunction {
 
  private:
   // Turns derivatives by the states of the second IMU to those by the
-  // keyframes, and by its mount, the last columns of by_imus.
+  // keyframes, and by the pose of its mount, columns of by_imus before the
+  // last.
   static void ByKeyframes(const SecondImuCalibration& imu,
                           const KeyframeState& x0,
                           const KeyframeState& x1,
                           const double* d,
                           InertialJacobians* J,
                           Eigen::MatrixXd* by_imus) {
-    auto by_mount = by_imus->rightCols<kMountTangentSize>();
+    const Eigen::Index mount = by_imus->cols() - kMountTangentSize;
+    auto by_mount = by_imus->middleCols<kMountPoseSize>(mount);
     const auto carry = [&](const KeyframeState& x, InertialMatrix* by_state) {
       const MountDerivatives at = DerivativesOfMount(imu, x);
       const Eigen::Matrix<double, 15, 6> by_pose = by_state->leftCols<6>();
@@ -124,8 +135,7 @@ class InertialCost final : public ceres::CostFunction {
     };
     carry(x0, &J->x0);
     carry(x1, &J->x1);
-    ByRotationOffset(d + by_imus->cols() - kMountTangentSize,
-                     by_mount.leftCols<3>());
+    ByRotationOffset(d + mount, by_mount.leftCols<3>());
   }
 
   const Calibration reference_;  // without cameras

@@ -170,10 +170,18 @@ class TransitionSolver {
     for (int i = 0; i < 9; ++i) rows->A[i][kTransitionNoise - 1] = T(0);
   }
 
- private:
   // Rotation, position, velocity.
   using Column = Eigen::Matrix<T, 9, 1>;
 
+  // Change of the state that compensates a derivative of the measured motion
+  // (psi, v, p).
+  Column OfMeasured(const Eigen::Matrix<T, 9, 1>& derivative) const {
+    return Carry(-derivative.template head<3>(),
+                 derivative.template segment<3>(3),
+                 derivative.template tail<3>());
+  }
+
+ private:
   Column Carry(const Vector3<T>& theta,
                const Vector3<T>& y_velocity,
                const Vector3<T>& y_position) const {
@@ -184,12 +192,6 @@ class TransitionSolver {
     x.template segment<3>(kStatePosition) =
         R_GI_ * (p_.cross(theta) - y_position) - dt_ * velocity;
     return x;
-  }
-
-  Column OfMeasured(const Eigen::Matrix<T, 9, 1>& derivative) const {
-    return Carry(-derivative.template head<3>(),
-                 derivative.template segment<3>(3),
-                 derivative.template tail<3>());
   }
 
   static void Write(const Column& x, int column, int stride, T* rows) {

@@ -2,6 +2,9 @@
 
 #include <Eigen/QR>
 
+#include "core/factor/imu_delay.h"
+#include "core/factor/inertial_terms.h"
+#include "core/factor/inertial_transition.h"
 #include "core/model/second_imu.h"
 
 namespace selfcal {
@@ -30,10 +33,12 @@ struct Places {
                   const TransitionColumns& second)
       : link1(first.link_size),
         mount(link1 + second.link_size),
+        delay(mount + kMountPoseSize),
         all(mount + kMountTangentSize, 2 * kMotion) {}
 
   int link1;
   int mount;
+  int delay;
   TransitionColumns all;
 };
 
@@ -51,11 +56,28 @@ RowMajor OfFirst(const ConstRows& G,
   return rows;
 }
 
+// The change of the state y0, as far as it moves, that compensates a change of
+// the measured motion (MotionByDelay).
+Eigen::Matrix<double, 9, 1> OfMeasured(
+    const InertialLinkStates& link,
+    double gravity_mps2,
+    const Eigen::Matrix<double, 9, 1>& measured) {
+  const KeyframeState& y0 = *link.x0;
+  const double dt_s = 1e-9 * static_cast<double>(link.x1->t_ns - y0.t_ns);
+  const StateMotion<double> motion =
+      MotionBetween(y0, *link.x1, dt_s, gravity_mps2);
+  const InertialResidual none = InertialResidual::Zero();
+  return inertial::TransitionSolver<double>(
+             y0.q_GI.toRotationMatrix(), motion, dt_s, none)
+      .OfMeasured(measured);
+}
+
 // The same of the second one, whose next pose depends on that of the keyframe
-// and on its mount.
+// and on its mount, and whose motion depends on its time offset.
 RowMajor OfSecond(const ConstRows& G,
                   const TransitionColumns& from,
                   const MountDerivatives& next,
+                  const Eigen::Matrix<double, 9, 1>& by_delay,
                   const Places& to) {
   RowMajor rows = RowMajor::Zero(G.rows(), to.all.stride);
   rows.middleCols(to.link1, from.link_size) = G.leftCols(from.link_size);
@@ -64,7 +86,8 @@ RowMajor OfSecond(const ConstRows& G,
   rows.col(to.all.constant) = G.col(from.constant);
   const auto by_pose = G.middleCols<kPose>(from.next_pose);
   rows.middleCols<kPose>(to.all.next_pose) = by_pose * next.by_pose;
-  rows.middleCols<kMountTangentSize>(to.mount) = by_pose * next.by_mount;
+  rows.middleCols<kMountPoseSize>(to.mount) = by_pose * next.by_mount;
+  rows.col(to.delay).head<9>() = by_delay;
   return rows;
 }
 
@@ -109,11 +132,14 @@ std::span<const InertialLinkStates> LinkBatch::InFrame(
 template <class Function>
 void LinkBatch::ForEachImu(const LinksOfImus& links,
                            const Calibration& theta,
+                           double gravity_mps2,
                            LinkTransitions* out,
                            const Function& linearise) {
   out->imus_ = ImuCount(theta);
+  std::span<const InertialLinkStates> second_links;
   for (int imu = 0; imu < out->imus_; ++imu) {
-    linearise(InFrame(links[imu], theta, imu), imu);
+    second_links = InFrame(links[imu], theta, imu);
+    linearise(second_links, imu);
   }
   out->joined_.clear();
   if (out->imus_ == 1) return;
@@ -126,10 +152,15 @@ void LinkBatch::ForEachImu(const LinksOfImus& links,
     const MountDerivatives at = DerivativesOfMount(mount, *links[0][i].x0);
     const Rows x = RowsOf(first), y = RowsOf(second);
     LinkTransitions::Joined& joined = out->joined_.emplace_back(places.all);
-    RowMajor D_y = OfSecond(y.G,
-                            second.columns,
-                            DerivativesOfMount(mount, *links[0][i].x1),
-                            places);
+    const InertialLinkStates& link = second_links[i];
+    const RowMajor D_y = OfSecond(
+        y.G,
+        second.columns,
+        DerivativesOfMount(mount, *links[0][i].x1),
+        OfMeasured(link,
+                   gravity_mps2,
+                   MotionByDelay(link.samples, *link.x0, *link.x1, mount)),
+        places);
     joined.G.topRows<kOne>() = OfFirst(x.G, first.columns, places);
     joined.G.bottomRows<kMotion>() = D_y.bottomRows<kMotion>();
     // C and D, of the pose of y.
@@ -137,7 +168,7 @@ void LinkBatch::ForEachImu(const LinksOfImus& links,
     C << at.by_pose * x.A.topLeftCorner<kPose, kOne>(),
         -y.A.topLeftCorner<kPose, kOne>();
     RowMajor D = at.by_pose * joined.G.topRows<kPose>();
-    D.middleCols<kMountTangentSize>(places.mount) += at.by_mount;
+    D.middleCols<kMountPoseSize>(places.mount) += at.by_mount;
     D -= D_y.topRows<kPose>();
 
     const Eigen::HouseholderQR<Eigen::Matrix<double, 2 * kOne, kPose>> qr(
@@ -166,6 +197,7 @@ void LinkBatch::Linearise(const LinksOfImus& links,
                           LinkTransitions* out) {
   ForEachImu(links,
              theta,
+             rig.gravity_mps2,
              out,
              [&](std::span<const InertialLinkStates> of_imu, int imu) {
                std::vector<InertialNoiseRoot>& roots = roots_[imu];
@@ -186,6 +218,7 @@ void LinkBatch::LineariseWithRoots(const LinksOfImus& links,
                                    LinkTransitions* out) {
   ForEachImu(links,
              theta,
+             gravity_mps2,
              out,
              [&](std::span<const InertialLinkStates> of_imu, int imu) {
                inertial_.LineariseWithRoots(of_imu,

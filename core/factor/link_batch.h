@@ -6,7 +6,8 @@
 // 24 unknowns. The transitions of both,
 //   x = A0 e0 + G0 z,   y = A1 e1 + G1 z,
 // with the state y of the second one, whose pose is P x + M mount to first
-// order, state its pose twice: C (e0, e1) + D z = 0. With C^T = Q1 R from a QR
+// order and whose measured motion depends on its time offset, state its pose
+// twice: C (e0, e1) + D z = 0. With C^T = Q1 R from a QR
 // factorisation, and (e0, e1) = Q1 u + Q2 e, that is u = -R^-T D z: six further
 // rows of unit information about z, and 24 white e. These are an orthonormal
 // combination of the noise of both, so that nothing is lost or squared.
@@ -108,6 +109,7 @@ class LinkBatch {
   template <class Function>
   void ForEachImu(const LinksOfImus& links,
                   const Calibration& theta,
+                  double gravity_mps2,
                   LinkTransitions* out,
                   const Function& linearise);
 

@@ -5,8 +5,8 @@
 // distortion + 1 to 3) + slopes components:
 //   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3, and those that it has of
 //   g-sensitivity 9 and position of the accelerometer 3 or 9;
-//   imu1, if there is a second IMU: the same, then q_JI 3, p_JI 3;
-//   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1,
+//   imu1, if there is a second IMU: the same, then q_JI 3, p_JI 3, time offset
+//   1; for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1,
 //   line delay 1 if its shutter is a rolling one, and time drift 1 if its clock
 //   drifts;
 //   slopes with temperature, those that it has: of the imu, of imu1, of each
@@ -29,6 +29,9 @@ namespace selfcal {
 // Limits the memory that one calibration from a client can claim.
 inline constexpr int kMaxCameras = 16;
 
+// Largest time offset of a second IMU [s]: kImuPadding_s leaves room for it.
+inline constexpr double kMaxSecondOffset_s = 0.1;
+
 // Offset of each block in the IMU's tangent; parameter_blocks.h checks them.
 inline constexpr int kGyroScale = 0;
 inline constexpr int kGyroMisalignment = kGyroScale + 3;
@@ -39,8 +42,9 @@ inline constexpr int kAccelRotation = kAccelMisalignment + 3;
 // with all of them.
 inline constexpr int kImuTangentSize = kAccelRotation + 3;
 inline constexpr int kMaxImuTangentSize = kImuTangentSize + 9 + 9;
-// The pose of a second IMU follows its intrinsics.
-inline constexpr int kMountTangentSize = 6;
+// The pose of a second IMU and its time offset follow its intrinsics.
+inline constexpr int kMountPoseSize = 6;
+inline constexpr int kMountTangentSize = kMountPoseSize + 1;
 inline constexpr int kMaxLinkTangentSize =
     2 * kMaxImuTangentSize + kMountTangentSize;
 // Offset of each block in a camera's tangent.
@@ -88,6 +92,8 @@ struct ImuCalibration {
 struct SecondImuCalibration : ImuCalibration {
   Eigen::Quaterniond q_JI = Eigen::Quaterniond::Identity();
   Eigen::Vector3d p_JI = Eigen::Vector3d::Zero();  // [m]
+  // t_imu - t_imu1 [s]: readings stamped t are of the time t + time_offset_s.
+  double time_offset_s = 0;
 };
 
 inline constexpr double kDefaultReferenceTemperature_c = 25;
@@ -115,7 +121,7 @@ struct TangentComponent {
 // Dimension of the tangent of a calibration.
 int TangentSize(const Calibration& theta);
 
-// Dimension of the tangent of an IMU without its slopes and its pose; that of
+// Dimension of the tangent of an IMU without its slopes and its mount; that of
 // the first IMU is the first part of the tangent of theta.
 int ImuTangentSize(const ImuCalibration& imu);
 

@@ -162,8 +162,10 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
      &ImuCalibration::accel_position},
 };
 
-// The pose of a second IMU. Prior sigmas are those of a drawing or a data
-// sheet: 0.5 degrees and 5 mm.
+// The pose of a second IMU, and its time offset, in the order of
+// kMountTangentSize. Prior sigmas of the pose are those of a drawing or a data
+// sheet: 0.5 degrees and 5 mm; that of the offset is that of filters and
+// drivers that differ, 5 ms.
 inline constexpr Block<SecondImuCalibration> kMountBlocks[] = {
     {{.name = "q_JI",
       .field = "q_JI",
@@ -181,6 +183,15 @@ inline constexpr Block<SecondImuCalibration> kMountBlocks[] = {
       .limit = 1e3,
       .words = "the distance from the first IMU along "},
      &SecondImuCalibration::p_JI},
+    {{.name = "time_offset",
+      .field = "time_offset_s",
+      .unit = "s",
+      .sigma_ref = 1e-5,
+      .prior_sigma = 5e-3,
+      .limit = kMaxSecondOffset_s,
+      .words = "the delay of the second IMU",
+      .estimated = false},
+     &SecondImuCalibration::time_offset_s},
 };
 
 inline constexpr Block<CameraCalibration> kCameraBlocks[] = {

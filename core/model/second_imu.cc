@@ -1,6 +1,7 @@
 #include "core/model/second_imu.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -13,6 +14,10 @@ namespace {
 
 Eigen::Vector3d PositionInBody(const SecondImuCalibration& imu) {
   return -(imu.q_JI.conjugate() * imu.p_JI);
+}
+
+std::int64_t OffsetNs(const SecondImuCalibration& imu) {
+  return std::llround(1e9 * imu.time_offset_s);
 }
 
 // Rate and specific force of the body by the readings of the first IMU.
@@ -59,7 +64,7 @@ KeyframeState StateOfImu(const Calibration& theta,
                          const KeyframeState& x) {
   if (imu == 0) return x;
   const SecondImuCalibration& mount = *theta.imu1;
-  return {.t_ns = x.t_ns,
+  return {.t_ns = x.t_ns - OffsetNs(mount),
           .q_GI = (x.q_GI * mount.q_JI.conjugate()).normalized(),
           .p_GI = x.p_GI + x.q_GI * PositionInBody(mount),
           .v_GI = x.v_GJ,
@@ -108,8 +113,10 @@ void StartSecondImu(const Calibration& theta_s, MotionSegment* segment) {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();
   int count = 0;
   for (const ImuSample& sample : SecondSamplesFromFirstKeyframe(*segment)) {
-    if (sample.t_ns > end.t_ns) break;
-    const MeasuredMotion motion = motion_at(begin, sample.t_ns);
+    const std::int64_t t_ns = sample.t_ns + OffsetNs(imu);
+    if (t_ns < begin.t_ns) continue;
+    if (t_ns > end.t_ns) break;
+    const MeasuredMotion motion = motion_at(begin, t_ns);
     const Eigen::Vector3d w_J = R_JI * motion.w_I;
     const Eigen::Vector3d f_J =
         R_JI * (motion.f_I + ForceByPosition<double>(motion.w_I, dw_I) * p_IJ);
@@ -119,8 +126,8 @@ void StartSecondImu(const Calibration& theta_s, MotionSegment* segment) {
     ++count;
   }
   for (KeyframeState& x : keyframes) {
-    x.b_g1 = gyro / count;
-    x.b_a1 = accel / count;
+    x.b_g1 = gyro / std::max(count, 1);
+    x.b_a1 = accel / std::max(count, 1);
   }
 }
 

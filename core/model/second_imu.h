@@ -5,9 +5,10 @@
 // The position of J in I is p_IJ = -R_JI^T p_JI, with T_JI of the calibration,
 // and
 //   q_GJ = q_GI q_JI^-1,   p_GJ = p_GI + R_GI p_IJ.
-// Its velocity and biases are separate unknowns of a keyframe: they follow from
-// its own readings, and not from the rates of the first IMU at the time of the
-// keyframe, which have the noise of single samples.
+// Its readings have a time offset, so that by their clock a state is at t -
+// time_offset_s. Its velocity and biases are separate unknowns of a keyframe:
+// they follow from its own readings, and not from the rates of the first IMU at
+// the time of the keyframe, which have the noise of single samples.
 //
 // Pure functions, callable from any thread.
 #pragma once
@@ -30,16 +31,18 @@ inline int StateTangentSize(const Calibration& theta) {
   return theta.imu1 ? kStateTangentSize2 : kStateTangentSize;
 }
 
-// The state of an IMU, with its frame for I; that of the first is x itself.
+// The state of an IMU, with its frame for I and the time by its clock, in whole
+// nanoseconds; that of the first is x itself.
 KeyframeState StateOfImu(const Calibration& theta,
                          int imu,
                          const KeyframeState& x);
 
 // Derivative of the pose of the second IMU (q_GJ 3, p_GJ 3) with respect to
-// that of a keyframe (q_GI 3, p_GI 3), and to its mount (q_JI 3, p_JI 3).
+// that of a keyframe (q_GI 3, p_GI 3), and to its mount (q_JI 3, p_JI 3); that
+// with respect to the time offset is in core/factor/imu_delay.h.
 struct MountDerivatives {
   Eigen::Matrix<double, 6, 6> by_pose;
-  Eigen::Matrix<double, 6, kMountTangentSize> by_mount;
+  Eigen::Matrix<double, 6, kMountPoseSize> by_mount;
 };
 MountDerivatives DerivativesOfMount(const SecondImuCalibration& imu,
                                     const KeyframeState& x);

@@ -1,6 +1,7 @@
 #include "core/model/segment.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/model/so3.h"
 
@@ -29,14 +30,17 @@ double SessionTime(const MotionSegment& segment, const KeyframeState& x) {
 
 namespace {
 
-std::span<const ImuSample> FromFirstKeyframe(
-    const MotionSegment& segment, const std::vector<ImuSample>& imu) {
+// From the last sample at or before a time before the first keyframe.
+std::span<const ImuSample> FromFirstKeyframe(const MotionSegment& segment,
+                                             const std::vector<ImuSample>& imu,
+                                             double before_s = 0) {
   if (segment.keyframes.empty()) return imu;
+  const std::int64_t from_ns =
+      segment.keyframes.front().t_ns - std::llround(1e9 * before_s);
   const auto later = [](std::int64_t t_ns, const ImuSample& sample) {
     return t_ns < sample.t_ns;
   };
-  auto first = std::upper_bound(
-      imu.begin(), imu.end(), segment.keyframes.front().t_ns, later);
+  auto first = std::upper_bound(imu.begin(), imu.end(), from_ns, later);
   if (first != imu.begin()) --first;
   return {first, imu.end()};
 }
@@ -50,7 +54,7 @@ std::span<const ImuSample> SamplesFromFirstKeyframe(
 
 std::span<const ImuSample> SecondSamplesFromFirstKeyframe(
     const MotionSegment& segment) {
-  return FromFirstKeyframe(segment, segment.imu1);
+  return FromFirstKeyframe(segment, segment.imu1, kMaxSecondOffset_s);
 }
 
 namespace {
@@ -77,7 +81,7 @@ std::span<const ImuSample> SamplesBetweenKeyframes(
 
 std::span<const ImuSample> SecondSamplesBetweenKeyframes(
     const MotionSegment& segment) {
-  return ToLastKeyframe(segment, SecondSamplesFromFirstKeyframe(segment));
+  return ToLastKeyframe(segment, FromFirstKeyframe(segment, segment.imu1));
 }
 
 }  // namespace selfcal

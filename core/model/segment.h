@@ -127,7 +127,8 @@ std::span<const ImuSample> SecondSamplesBetweenKeyframes(
 // digits would not be those of a segment without.
 std::span<const ImuSample> SamplesFromFirstKeyframe(
     const MotionSegment& segment);
-// The same of the second IMU.
+// The same of the second IMU, earlier by the largest time offset that it may
+// have.
 std::span<const ImuSample> SecondSamplesFromFirstKeyframe(
     const MotionSegment& segment);
 

@@ -127,17 +127,24 @@ ImuReadings SimulateSecondImu(const Rig& rig,
                               const SecondImuCalibration& imu,
                               const Trajectory& trajectory,
                               const SimulationOptions& options) {
-  return SimulateReadings(rig,
-                          {.imu = imu,
-                           .density = rig.imu1_noise,
-                           .b_a0 = options.second_b_a0,
-                           .b_g0 = options.second_b_g0,
-                           .noise_stream = kSecondImuNoiseStream,
-                           .walk_stream = kSecondBiasWalkStream,
-                           .phase_s = kSecondPhase_s,
-                           .mount = &imu},
-                          trajectory,
-                          options);
+  ImuReadings readings =
+      SimulateReadings(rig,
+                       {.imu = imu,
+                        .density = rig.imu1_noise,
+                        .b_a0 = options.second_b_a0,
+                        .b_g0 = options.second_b_g0,
+                        .noise_stream = kSecondImuNoiseStream,
+                        .walk_stream = kSecondBiasWalkStream,
+                        .phase_s = kSecondPhase_s,
+                        .mount = &imu},
+                       trajectory,
+                       options);
+  for (auto* samples : {&readings.measured, &readings.noise_free}) {
+    for (ImuSample& sample : *samples) {
+      sample.t_ns -= std::llround(1e9 * imu.time_offset_s);
+    }
+  }
+  return readings;
 }
 
 void AddSecondMotion(const Trajectory& trajectory,

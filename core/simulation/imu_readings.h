@@ -35,7 +35,7 @@ ImuReadings SimulateImu(const Rig& rig,
                         const SimulationOptions& options);
 
 // The same of a second IMU, which moves rigidly with the body. Its samples are
-// at other times than those of the first one.
+// at other times than those of the first one, and have the stamps of its clock.
 ImuReadings SimulateSecondImu(const Rig& rig,
                               const SecondImuCalibration& imu,
                               const Trajectory& trajectory,

@@ -3,6 +3,7 @@
 #include <map>
 #include <vector>
 
+#include "core/factor/imu_delay.h"
 #include "core/factor/inertial.h"
 #include "core/factor/reprojection.h"
 #include "core/information/weak_priors.h"
@@ -162,6 +163,16 @@ class Assembly {
     const int row = AddResidual(W * r);
     const int first = imu == 0 ? 0 : ImuTangentSize(theta0_.imu);
     AddTheta(row, first, W * J.theta);
+    if (imu == 1) {
+      AddTheta(row,
+               LinkTangentSize(theta0_) - 1,
+               W * ResidualByDelay(SecondSamplesFromFirstKeyframe(segment_),
+                                   StateOfImu(theta0_, imu, x0),
+                                   StateOfImu(theta0_, imu, x1),
+                                   *theta0_.imu1,
+                                   rig_.imu1_noise,
+                                   rig_.gravity_mps2));
+    }
     AddImuState(row, k, imu, W * J.x0);
     AddImuState(row, k + 1, imu, W * J.x1);
   }

@@ -42,16 +42,19 @@ def command(
             "--selfcald", SELFCALD, *options]  # fmt: skip
 
 
-def copy_with_readings_later(
-    recording: pathlib.Path, copy: pathlib.Path, by_ns: int
-) -> pathlib.Path:
-    shutil.copytree(recording, copy)
-    readings = copy / "mav0/imu0/data.csv"
+def stamp_later(readings: pathlib.Path, by_ns: int) -> None:
     first, *lines = readings.read_text().splitlines(keepends=True)
     for n, line in enumerate(lines):
         stamp, rest = line.split(",", 1)
         lines[n] = f"{int(stamp) + by_ns},{rest}"
     readings.write_text(first + "".join(lines))
+
+
+def copy_with_readings_later(
+    recording: pathlib.Path, copy: pathlib.Path, by_ns: int
+) -> pathlib.Path:
+    shutil.copytree(recording, copy)
+    stamp_later(copy / "mav0/imu0/data.csv", by_ns)
     return copy
 
 
@@ -187,6 +190,8 @@ class Calibrate(unittest.TestCase):
             pose[4 * row : 4 * row + 2] = c * a + s * b, c * b - s * a
         pose[3] += 0.004
         sensor.write_text(text.replace(found[0], f"data: {pose}"))
+        # Its readings are stamped 3 ms late.
+        stamp_later(walk / "mav0/imu1/data.csv", 3_000_000)
         output = self.folder / "two_imus_output"
         done = calibrate(walk, output)
         self.assertIn(done.returncode, (0, 5), done.stderr)
@@ -199,6 +204,7 @@ class Calibrate(unittest.TestCase):
             self.assertLess(abs(result["s_g"][axis] - truth["s_g"][axis]), 3e-3)
         dot = sum(result["q_ji"][a] * truth["q_ji"][a] for a in "wxyz")
         self.assertLess(2 * math.acos(min(1, abs(dot))), 2e-3)
+        self.assertLess(abs(result["time_offset_s"] + 3e-3), 1e-4)
         self.assertTrue((output / "kalibr/imu1.yaml").exists())
 
         # A further recording has to have its readings, too.

@@ -351,6 +351,7 @@ TEST(ExportKalibr, ASecondImuHasAFileOfItsOwn) {
     Rig rig = RandomRig(kExpressible[0], &random);
     rig.factory.imu1 = random.ThetaOfTwoImus().imu1;
     rig.factory.imu1->accel_position.resize(0);
+    rig.factory.imu1->time_offset_s = random.Uniform(-0.01, 0.01);
     rig.imu1_noise = {2e-4, 3e-3, 4e-6, 5e-5};
     const auto files = ExportRig("kalibr", rig, rig.factory, kOptions);
     ASSERT_TRUE(files.ok()) << files.status();

@@ -58,6 +58,26 @@ TEST(TwoImus, AreFoundWithinTheirSigmas) {
   });
 }
 
+TEST(TwoImus, TheTimeOffsetOfTheSecondOneIsFound) {
+  const Rig rig = RigOfTwoImus();
+  Calibration truth = rig.factory;
+  truth.imu1->time_offset_s = 4e-3;
+  const int offset = LinkTangentSize(truth) - 1;
+  ExpectConsistent(6, [&](std::uint64_t seed) {
+    Rig wrong = rig;
+    wrong.factory = PerturbCalibration(rig.factory, {}, seed);
+    wrong.blocks = {{"imu1.time_offset", true}};
+    wrong.groups = DefaultGroups(wrong.blocks, wrong.factory);
+    const Errors errors = CalibrateSimulated(wrong, truth, seed);
+    const double sigma = std::sqrt(errors.covariance(offset, offset));
+    std::printf(
+        "time offset: %.2g off, sigma %.2g\n", errors.error(offset), sigma);
+    EXPECT_LT(std::abs(errors.error(offset)), 3.5 * sigma);
+    EXPECT_LT(sigma, 2e-5);
+    return errors;
+  });
+}
+
 TEST(TwoImus, TheSecondOneOnlyAddsInformation) {
   const Rig two = RigOfTwoImus();
   Rig one = two;

@@ -98,6 +98,7 @@ class RandomValues {
     imu.accel_position = Vector(3, 0.05);
     imu.q_JI = Rotation();
     imu.p_JI = Vector(3, 0.1);
+    imu.time_offset_s = Uniform(-0.01, 0.01);
     return theta;
   }
 

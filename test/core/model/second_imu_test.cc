@@ -29,7 +29,8 @@ Eigen::Matrix<double, 6, 1> PoseDifference(const KeyframeState& a,
 TEST(SecondImu, ItsFrameIsWhereItsMountPutsIt) {
   RandomValues random(1);
   for (int trial = 0; trial < 100; ++trial) {
-    const Calibration theta = random.ThetaOfTwoImus();
+    Calibration theta = random.ThetaOfTwoImus();
+    theta.imu1->time_offset_s = 3e-3;
     const KeyframeState x = RandomState(random);
     const KeyframeState y = StateOfImu(theta, 1, x);
     // A point of the world, seen from J directly and by way of I.
@@ -37,6 +38,7 @@ TEST(SecondImu, ItsFrameIsWhereItsMountPutsIt) {
     const Eigen::Vector3d p_I = x.q_GI.conjugate() * (p_G - x.p_GI);
     const Eigen::Vector3d p_J = theta.imu1->q_JI * p_I + theta.imu1->p_JI;
     EXPECT_LT((y.q_GI.conjugate() * (p_G - y.p_GI) - p_J).norm(), 1e-12);
+    EXPECT_EQ(y.t_ns, x.t_ns - 3'000'000);
     EXPECT_EQ(y.v_GI, x.v_GJ);
     EXPECT_EQ(y.b_a, x.b_a1);
     EXPECT_EQ(y.b_g, x.b_g1);
