@@ -198,7 +198,7 @@ ExportedFiles ExportBasalt(const Rig& rig,
   root["cam_time_offset_ns"] = static_cast<std::int64_t>(
       std::llround(theta.cameras[0].time_offset_s * kNsPerS));
   root["vignette"] = Json::array();
-  AddImuBlockLosses("basalt", {}, theta.imu, &result.losses);
+  AddImuBlockLosses("basalt", {}, "imu", theta.imu, &result.losses);
   AddOdometryLoss(theta.cameras[0].time_offset_s, &result.losses);
   AddSharedOffsetLosses("basalt", theta, &result.losses);
   AddLineDelayLosses("basalt", theta, &result.losses);

@@ -34,8 +34,10 @@ CalibrationProblem ProblemOf(const CalibrationProblem& all,
   problem.chain_temperatures_c = {all.chain_temperatures_c[chain]};
   for (const InertialLink& link : all.inertial_links) {
     if (!range.Contains(link.before) || !range.Contains(link.after)) continue;
-    problem.inertial_links.push_back(
-        {link.before - range.first, link.after - range.first, link.samples});
+    problem.inertial_links.push_back({link.before - range.first,
+                                      link.after - range.first,
+                                      link.samples,
+                                      link.imu});
   }
   return problem;
 }

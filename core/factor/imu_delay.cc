@@ -4,11 +4,6 @@
 #include "core/model/so3.h"
 
 namespace selfcal {
-namespace {
-
-constexpr double kTwoSteps_s = 2e-9 * static_cast<double>(kDelayStep_ns);
-
-}  // namespace
 
 Eigen::Matrix<double, 9, 1> MotionByDelay(std::span<const ImuSample> samples,
                                           const KeyframeState& y0,
@@ -26,26 +21,30 @@ Eigen::Matrix<double, 9, 1> MotionByDelay(std::span<const ImuSample> samples,
   };
   const Preintegration more = moved(kDelayStep_ns);
   const Preintegration less = moved(-kDelayStep_ns);
+  constexpr double kTwoSteps_s = 2e-9 * static_cast<double>(kDelayStep_ns);
   Eigen::Matrix<double, 9, 1> by_delay;
   by_delay << Log(more.Delta_R * less.Delta_R.conjugate()),
       more.Delta_v - less.Delta_v, more.Delta_p - less.Delta_p;
   return by_delay / kTwoSteps_s;
 }
 
+// Every change of the motion enters the residual with a negative sign, the
+// rotation through Log: Log(Delta_R^-1 q_01) changes by -J_l^-1 Delta_R^-1 psi.
 InertialResidual ResidualByDelay(std::span<const ImuSample> samples,
                                  const KeyframeState& y0,
                                  const KeyframeState& y1,
                                  const ImuCalibration& imu,
-                                 const ImuNoise& noise,
-                                 double gravity_mps2) {
-  const auto moved = [&](std::int64_t by_ns) {
-    KeyframeState a = y0, b = y1;
-    a.t_ns -= by_ns;
-    b.t_ns -= by_ns;
-    return EvaluateInertial(
-        samples, a, b, imu, noise, gravity_mps2, nullptr, nullptr);
-  };
-  return (moved(kDelayStep_ns) - moved(-kDelayStep_ns)) / kTwoSteps_s;
+                                 const InertialResidual& residual) {
+  const Eigen::Matrix<double, 9, 1> motion =
+      MotionByDelay(samples, y0, y1, imu);
+  const Eigen::Vector3d r = residual.head<3>();
+  const Eigen::Quaterniond q_01 = y0.q_GI.conjugate() * y1.q_GI;
+  const Eigen::Vector3d psi = motion.head<3>();
+  const Eigen::Vector3d turn = Exp(r) * (q_01.conjugate() * psi);
+  InertialResidual by_delay = InertialResidual::Zero();
+  by_delay.head<3>() = -RightJacobianInverse(-r) * turn;
+  by_delay.segment<6>(3) = -motion.tail<6>();
+  return by_delay;
 }
 
 }  // namespace selfcal

@@ -16,7 +16,6 @@
 
 #include "core/factor/inertial.h"
 #include "core/model/calibration.h"
-#include "core/model/rig.h"
 #include "core/model/segment.h"
 
 namespace selfcal {
@@ -30,12 +29,11 @@ Eigen::Matrix<double, 9, 1> MotionByDelay(std::span<const ImuSample> samples,
                                           const KeyframeState& y1,
                                           const ImuCalibration& imu);
 
-// Of the residual between both states.
+// Of the residual between both states, which is given (EvaluateInertial).
 InertialResidual ResidualByDelay(std::span<const ImuSample> samples,
                                  const KeyframeState& y0,
                                  const KeyframeState& y1,
                                  const ImuCalibration& imu,
-                                 const ImuNoise& noise,
-                                 double gravity_mps2);
+                                 const InertialResidual& residual);
 
 }  // namespace selfcal

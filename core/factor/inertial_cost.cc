@@ -80,14 +80,16 @@ class InertialCost final : public ceres::CostFunction {
     const Calibration theta = OffsetImus(reference_, parameters[kTheta]);
     InertialJacobians J;
     Map<InertialResidual> r(residuals);
-    r = W_ * EvaluateInertial(samples_,
-                              StateOfImu(theta, imu_, x0),
-                              StateOfImu(theta, imu_, x1),
-                              ImuOf(theta, imu_),
-                              noise_,
-                              gravity_mps2_,
-                              jacobians == nullptr ? nullptr : &J,
-                              nullptr);
+    const InertialResidual residual =
+        EvaluateInertial(samples_,
+                         StateOfImu(theta, imu_, x0),
+                         StateOfImu(theta, imu_, x1),
+                         ImuOf(theta, imu_),
+                         noise_,
+                         gravity_mps2_,
+                         jacobians == nullptr ? nullptr : &J,
+                         nullptr);
+    r = W_ * residual;
     if (jacobians == nullptr) return true;
     const double* d = parameters[kTheta];
     Eigen::MatrixXd by_imus =
@@ -102,8 +104,7 @@ class InertialCost final : public ceres::CostFunction {
                                                StateOfImu(theta, 1, x0),
                                                StateOfImu(theta, 1, x1),
                                                *theta.imu1,
-                                               noise_,
-                                               gravity_mps2_);
+                                               residual);
     }
     if (double* out = jacobians[kTheta]) {
       Map<RowMajor15<Eigen::Dynamic>> by_theta(out, 15, theta_size_);

@@ -42,20 +42,6 @@ struct Places {
   TransitionColumns all;
 };
 
-// G z of the first IMU, whose parameters come first.
-RowMajor OfFirst(const ConstRows& G,
-                 const TransitionColumns& from,
-                 const Places& to) {
-  RowMajor rows = RowMajor::Zero(G.rows(), to.all.stride);
-  rows.leftCols(from.link_size) = G.leftCols(from.link_size);
-  rows.middleCols<kMotion>(to.all.link_size) =
-      G.middleCols<kMotion>(from.link_size);
-  rows.col(to.all.constant) = G.col(from.constant);
-  rows.middleCols<kPose>(to.all.next_pose) =
-      G.middleCols<kPose>(from.next_pose);
-  return rows;
-}
-
 // The change of the state y0, as far as it moves, that compensates a change of
 // the measured motion (MotionByDelay).
 Eigen::Matrix<double, 9, 1> OfMeasured(
@@ -70,6 +56,20 @@ Eigen::Matrix<double, 9, 1> OfMeasured(
   return inertial::TransitionSolver<double>(
              y0.q_GI.toRotationMatrix(), motion, dt_s, none)
       .OfMeasured(measured);
+}
+
+// G z of the first IMU, whose parameters come first.
+RowMajor OfFirst(const ConstRows& G,
+                 const TransitionColumns& from,
+                 const Places& to) {
+  RowMajor rows = RowMajor::Zero(G.rows(), to.all.stride);
+  rows.leftCols(from.link_size) = G.leftCols(from.link_size);
+  rows.middleCols<kMotion>(to.all.link_size) =
+      G.middleCols<kMotion>(from.link_size);
+  rows.col(to.all.constant) = G.col(from.constant);
+  rows.middleCols<kPose>(to.all.next_pose) =
+      G.middleCols<kPose>(from.next_pose);
+  return rows;
 }
 
 // The same of the second one, whose next pose depends on that of the keyframe

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/calibration.h"
 #include "core/model/so3.h"
 
 namespace selfcal {

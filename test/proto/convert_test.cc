@@ -57,6 +57,7 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
                static_cast<const ImuCalibration&>(*b.imu1));
     EXPECT_TRUE(SameBits(a.imu1->q_JI, b.imu1->q_JI));
     EXPECT_TRUE(SameBits(a.imu1->p_JI, b.imu1->p_JI));
+    EXPECT_TRUE(SameBits(a.imu1->time_offset_s, b.imu1->time_offset_s));
   }
   if (HasSlopes(a)) {
     EXPECT_TRUE(SameBits(a.reference_temperature_c, b.reference_temperature_c));
@@ -304,9 +305,13 @@ TEST(Convert, EveryMissingPartOfACalibrationIsNamed) {
 TEST(Convert, ASecondImuNeedsAPoseAndTheFirstHasNone) {
   v1::CalibrationParameters message = ToProto(Calibration());
   message.mutable_imu()->mutable_q_ji();
+  message.mutable_imu()->set_time_offset_s(1e-3);
   *message.mutable_imu1() = ToProto(Calibration()).imu();
   EXPECT_THAT(FaultyFields(message, Calibration()),
-              ElementsAre("x.imu.q_ji", "x.imu1.q_ji", "x.imu1.p_ji"));
+              ElementsAre("x.imu.q_ji",
+                          "x.imu.time_offset_s",
+                          "x.imu1.q_ji",
+                          "x.imu1.p_ji"));
 }
 
 TEST(Convert, OnlyARigWithASecondImuHasItsNoise) {

@@ -101,6 +101,7 @@ class RandomValues {
       imu.s_a_slope = Optional(3 * Int(0, 1));
       imu.q_JI = Quaternion();
       imu.p_JI = Vector3();
+      imu.time_offset_s = Double();
     }
     theta.reference_temperature_c = Double();
     for (int i = Int(0, 4); i > 0; --i) theta.cameras.push_back(Camera());

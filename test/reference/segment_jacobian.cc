@@ -170,8 +170,7 @@ class Assembly {
                                    StateOfImu(theta0_, imu, x0),
                                    StateOfImu(theta0_, imu, x1),
                                    *theta0_.imu1,
-                                   rig_.imu1_noise,
-                                   rig_.gravity_mps2));
+                                   r));
     }
     AddImuState(row, k, imu, W * J.x0);
     AddImuState(row, k + 1, imu, W * J.x1);

@@ -213,7 +213,7 @@ TEST(BagTopics, RawImagesArePreferredToTheirCompressedOnes) {
 TEST(BagTopics, StatedOnesAreUsedInTheirOrder) {
   const auto recording =
       Open("raw_and_png.mcap",
-           {{"/cam1/image_raw/compressed", "/cam0/image_raw"}, "/imu0"});
+           {{"/cam1/image_raw/compressed", "/cam0/image_raw"}, {"/imu0"}});
   ASSERT_TRUE(recording.ok()) << recording.status();
   EXPECT_THAT((*recording)->problems(), IsEmpty());
   ASSERT_EQ((*recording)->cameras().size(), 2u);

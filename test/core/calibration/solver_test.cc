@@ -267,6 +267,8 @@ TEST(Solvers, AgreeWithFixedComponents) {
 TEST(Solvers, AgreeOnTwoImusAcrossGaps) {
   Rig rig = HandheldRig("r");
   AddSecondImu(&rig);
+  rig.blocks = {{"imu1.time_offset", true}};
+  rig.factory.imu1->time_offset_s = 1e-3;
   const Calibration truth = rig.factory;
   rig = WrongRig(rig);
   std::vector<MotionSegment> segments =

@@ -82,6 +82,8 @@ std::vector<Case> WellConditionedCases() {
     Case c;
     c.rig = HandheldRig("handheld");
     AddSecondImu(&c.rig);
+    c.rig.blocks = {{"imu1.time_offset", true}};
+    c.rig.factory.imu1->time_offset_s = 2e-3;
     c.theta0 = c.rig.factory;
     if (seed > 11) c.theta0 = PerturbCalibration(c.rig.factory, {}, seed);
     SimulationOptions options;

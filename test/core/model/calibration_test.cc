@@ -156,20 +156,21 @@ TEST(Calibration, ASecondImuFollowsTheFirst) {
   without.imu1.reset();
   EXPECT_FALSE(SameShape(theta, without));
   const int first = ImuTangentSize(theta.imu);
-  const int size = kImuTangentSize + 9 + 3 + 6;
+  const int size = kImuTangentSize + 9 + 3 + 6 + 1;
   EXPECT_EQ(TangentSize(theta), TangentSize(without) + size);
   EXPECT_EQ(LinkTangentSize(theta), first + size);
   EXPECT_EQ(CameraTangentOffset(theta, 0), first + size);
   const auto components = TangentComponents(theta);
   EXPECT_EQ(components[first].name, "imu1.gyro.scale.x");
-  EXPECT_EQ(components[first + size - 6].name, "imu1.q_JI.x");
-  EXPECT_EQ(components[first + size - 1].name, "imu1.p_JI.z");
-  EXPECT_EQ(components[first + size - 1].unit, "m");
+  EXPECT_EQ(components[first + size - 7].name, "imu1.q_JI.x");
+  EXPECT_EQ(components[first + size - 2].name, "imu1.p_JI.z");
+  EXPECT_EQ(components[first + size - 2].unit, "m");
+  EXPECT_EQ(components[first + size - 1].name, "imu1.time_offset");
   const Eigen::VectorXd delta = random.Vector(TangentSize(theta), 0.1);
   const Calibration moved = BoxPlus(theta, delta);
   EXPECT_LT((BoxMinus(moved, theta) - delta).norm(), 1e-12);
   EXPECT_LT(
-      (moved.imu1->p_JI - theta.imu1->p_JI - delta.segment<3>(first + size - 3))
+      (moved.imu1->p_JI - theta.imu1->p_JI - delta.segment<3>(first + size - 4))
           .norm(),
       1e-15);
   Calibration broken = theta;

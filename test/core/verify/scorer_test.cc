@@ -109,6 +109,7 @@ TEST(Scorers, AgreeOnSlopesWithTemperature) {
 TEST(Scorers, AgreeOnTwoImus) {
   Rig rig = HandheldRig("handheld");
   AddSecondImu(&rig);
+  rig.blocks = {{"imu1.time_offset", true}};
   rig.fixed = {"imu1.q_JI.y"};
   std::mt19937 random(2);
   for (const MotionKind kind :

@@ -83,9 +83,9 @@ export function component(name: string): string {
   if (camera && first) {
     return [`${say(first)} of camera ${camera[1]}`, ...rest].join(', ');
   }
-  if (!['imu', 'imu1'].includes(device) || rest.length === 0) return name;
+  if (!['imu', 'imu1'].includes(device) || !first) return name;
   const owner = device === 'imu1' ? ' of the second IMU' : '';
-  if (/^(q_AI|q_JI|p_JI)/.test(first)) {
+  if (rest.length === 0 || /^(q_AI|q_JI|p_JI)/.test(first)) {
     return [say(first) + owner, ...rest].join(', ');
   }
   const [what, ...axis] = rest;
