@@ -28,17 +28,16 @@ std::vector<KeyframeState> TrueKeyframes(const Trajectory& trajectory,
   Random random(options.seed, kKeyframeTimeStream);
   std::vector<KeyframeState> keyframes;
   if (imu.measured.empty()) return keyframes;
-  std::int64_t end_ns = imu.measured.back().t_ns;
-  if (!imu1.measured.empty()) {
-    end_ns = std::min(end_ns, imu1.measured.back().t_ns);
-  }
+  const std::int64_t end_ns = imu.measured.back().t_ns;
+  const std::int64_t end1_ns =
+      imu1.measured.empty() ? end_ns : imu1.measured.back().t_ns;
   for (int k = 0;; ++k) {
     const double t_s = k / options.keyframe_rate_hz + kKeyframeOffset_s +
                        random.Uniform(-kKeyframeJitter_s, kKeyframeJitter_s) +
                        margins.before_s;
     const std::int64_t t_ns = std::llround(t_s * 1e9);
     const std::int64_t last_ns = t_ns + std::llround(margins.after_s * 1e9);
-    if (last_ns > end_ns) return keyframes;
+    if (last_ns > end_ns || t_ns > end1_ns) return keyframes;
     keyframes.push_back(TrueState(trajectory, imu, t_ns));
   }
 }

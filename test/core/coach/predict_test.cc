@@ -71,6 +71,20 @@ TEST(Predict, AllowsADelayOfTheImages) {
   }
 }
 
+TEST(Predict, AllowsATimeOffsetOfASecondImu) {
+  Rig rig = HandheldRig("r");
+  AddSecondImu(&rig);
+  rig.blocks = {{"*.time_offset", true}};
+  for (const double offset_s : {-kMaxSecondOffset_s, kMaxSecondOffset_s}) {
+    rig.factory.imu1->time_offset_s = offset_s;
+    const Predictions predictions = Predict(rig, rig.factory);
+    ASSERT_FALSE(predictions.motions.empty());
+    for (const MotionPrediction& motion : predictions.motions) {
+      EXPECT_TRUE(motion.Lambda.allFinite());
+    }
+  }
+}
+
 // A motion is predicted with a calibration as inaccurate as a factory
 // calibration. Its predicted value is that of real segments: the remaining
 // sigmas are right within a few tens of percent, on average over the directions

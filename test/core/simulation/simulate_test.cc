@@ -35,6 +35,19 @@ TEST(SimulateTest, SegmentsKeepAllRules) {
   }
 }
 
+TEST(SimulateTest, SegmentsOfASecondImuWithATimeOffsetKeepThem) {
+  Rig rig = HandheldRig("a");
+  AddSecondImu(&rig);
+  for (const double offset_s : {-kMaxSecondOffset_s, kMaxSecondOffset_s}) {
+    rig.factory.imu1->time_offset_s = offset_s;
+    const SimulatedSession session = SimulateHandheld(rig, 12, {});
+    ASSERT_GE(session.segments.size(), 2u);
+    for (const MotionSegment& segment : session.segments) {
+      EXPECT_TRUE(Validate(segment, rig.factory).empty());
+    }
+  }
+}
+
 TEST(SimulateTest, EveryLandmarkOfASegmentIsObservedThereAtLeastThreeTimes) {
   const SimulatedSession session = SimulateHandheld(StereoRig(), 40, {});
   ASSERT_FALSE(session.segments.empty());
