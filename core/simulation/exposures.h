@@ -54,8 +54,8 @@ double KeyframeDelay(const Calibration& theta_true,
                      const Calibration& theta_slam,
                      double session_s);
 
-// The largest time by which any of these, or the begin or end of the readings of
-// a second IMU by its clock, is before, or after, its keyframe.
+// The largest time by which any of these, or the begin or end of the readings
+// of a second IMU by its clock, is before, or after, its keyframe.
 struct TimeMargins {
   double before_s = 0;
   double after_s = 0;

@@ -148,7 +148,8 @@ void LeaveOutDetails(v1::Calibration* calibration) {
 }
 
 // A covariance of 45 components is 17 kB in JSON: a page of so many versions is
-// answered in 19 ms, one of 50 without the details in 24 (docs/fleet.md, Lists).
+// answered in 19 ms, one of 50 without the details in 24 (docs/fleet.md,
+// Lists).
 constexpr int kMaxDetailedVersions = 15;
 
 absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(

@@ -59,8 +59,8 @@ bool OfImuReadings(NoiseKind kind) {
   return first == NoiseKind::kGyro || first == NoiseKind::kAccel;
 }
 
-// True if the readings of an IMU err by much more than the rig states. Noise may
-// be stated wrongly, but an error that is no noise looks the same.
+// True if the readings of an IMU err by much more than the rig states. Noise
+// may be stated wrongly, but an error that is no noise looks the same.
 bool ReadingsErrMore(const CheckContext& context) {
   return std::any_of(context.result.noise_scales.begin(),
                      context.result.noise_scales.end(),

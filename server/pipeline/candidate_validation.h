@@ -74,8 +74,8 @@ struct CandidateLimits {
   double max_error_ratio = 1.1;
   // Largest variance between segments over that which noise explains; more if
   // few degrees of freedom are tested, so that chance alone exceeds it once in
-  // a thousand times. Versions of 32 kinds of simulated devices have 0.96 in the
-  // median, and active ones up to 1.36; a Tango has 0.78, EuRoC V1_01 with
+  // a thousand times. Versions of 32 kinds of simulated devices have 0.96 in
+  // the median, and active ones up to 1.36; a Tango has 0.78, EuRoC V1_01 with
   // unoptimised states at 1 keyframe a second 1.28 to 1.57
   // (./test/evaluate --only trust).
   double max_disagreement = 1.3;

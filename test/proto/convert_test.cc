@@ -307,11 +307,10 @@ TEST(Convert, ASecondImuNeedsAPoseAndTheFirstHasNone) {
   message.mutable_imu()->mutable_q_ji();
   message.mutable_imu()->set_time_offset_s(1e-3);
   *message.mutable_imu1() = ToProto(Calibration()).imu();
-  EXPECT_THAT(FaultyFields(message, Calibration()),
-              ElementsAre("x.imu.q_ji",
-                          "x.imu.time_offset_s",
-                          "x.imu1.q_ji",
-                          "x.imu1.p_ji"));
+  EXPECT_THAT(
+      FaultyFields(message, Calibration()),
+      ElementsAre(
+          "x.imu.q_ji", "x.imu.time_offset_s", "x.imu1.q_ji", "x.imu1.p_ji"));
 }
 
 TEST(Convert, OnlyARigWithASecondImuHasItsNoise) {
