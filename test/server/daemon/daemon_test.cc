@@ -140,7 +140,7 @@ TEST_F(DaemonTest, ASecondImuComesOverTheWireIntoAVersion) {
                           [](const v1::ComponentEstimate& estimate) {
                             return estimate.component().starts_with("imu1.");
                           }),
-            21);
+            22);
 }
 
 // Scores by Ceres in the daemon; the checks in processes of their own.
