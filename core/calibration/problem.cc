@@ -19,7 +19,8 @@
 namespace selfcal {
 namespace {
 
-// Of the second IMU also those within the largest time offset.
+// SamplesBetween; for the second IMU earlier and later by the largest time
+// offset.
 std::span<const ImuSample> SamplesOfLink(std::span<const ImuSample> samples,
                                          int imu,
                                          std::int64_t t0_ns,

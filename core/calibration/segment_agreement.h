@@ -4,8 +4,8 @@
 // At the minimum of a calibration each segment is linearised alone, at the
 // states and landmarks and with the weights of the joint estimate
 // (segment_part.h), and tested against the sum of all others (agreement.h).
-// With other weights, it would be tested how errors scatter that the estimate
-// does not have: residuals with heavy tails move an unweighted sum by far more
+// Other weights would test how errors scatter that the estimate does not have:
+// residuals with heavy tails move an unweighted sum by far more
 // than a robust estimate.
 //
 // Pure, callable from any thread, deterministic.
@@ -32,9 +32,9 @@ struct SegmentEvidence {
   SegmentFit fit;  // its key and the ratios of its residuals
 };
 
-// At the minimum, with the weights of the calibration. `segments` are those of
-// its problem; `squares_of_a_reprojection` is the expected sum of squares of
-// its two whitened rows, 0 if unknown.
+// The evidence at the minimum, with the weights of the calibration. `segments`
+// are those of its problem; `squares_of_a_reprojection` is the expected sum of
+// squares of its two whitened rows, 0 if unknown.
 std::vector<SegmentEvidence> CollectEvidence(
     const WorkingPoint& point,
     const std::vector<const MotionSegment*>& segments,

@@ -136,13 +136,12 @@ void LinkBatch::ForEachImu(const LinksOfImus& links,
                            LinkTransitions* out,
                            const Function& linearise) {
   out->imus_ = ImuCount(theta);
-  std::span<const InertialLinkStates> second_links;
-  for (int imu = 0; imu < out->imus_; ++imu) {
-    second_links = InFrame(links[imu], theta, imu);
-    linearise(second_links, imu);
-  }
+  linearise(links[0], 0);
   out->joined_.clear();
   if (out->imus_ == 1) return;
+  const std::span<const InertialLinkStates> second_links =
+      InFrame(links[1], theta, 1);
+  linearise(second_links, 1);
   const SecondImuCalibration& mount = *theta.imu1;
   for (std::size_t i = 0; i < out->size(); ++i) {
     const ChainTransition first = out->of_imu_[0][i];

@@ -31,7 +31,8 @@ double SessionTime(const MotionSegment& segment, const KeyframeState& x) {
 
 namespace {
 
-// From the last sample at or before a time before the first keyframe.
+// Samples from the last at or before a time, `before_s` before the first
+// keyframe.
 std::span<const ImuSample> FromFirstKeyframe(const MotionSegment& segment,
                                              const std::vector<ImuSample>& imu,
                                              double before_s = 0) {

@@ -70,7 +70,7 @@ TimeMargins ExposureMargins(const Calibration& theta_true,
     margins.before_s = std::max(margins.before_s, -dt_s);
     margins.after_s = std::max(margins.after_s, dt_s);
   };
-  // By the clock of a second IMU, a keyframe is earlier by its offset.
+  // A keyframe is earlier by the clock of a second IMU, by its offset.
   if (theta_true.imu1) include(theta_true.imu1->time_offset_s);
   // Offsets are linear in time, and thus largest at either end.
   for (const double session_s : {age_s, age_s + duration_s}) {

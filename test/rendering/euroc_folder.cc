@@ -46,7 +46,7 @@ std::string_view CameraModelOf(const CameraCalibration& camera) {
   return "pinhole";
 }
 
-// With the pose of a sensor S in the body, by T_SB.
+// The key T_BS of a sensor S, from its T_SB.
 std::string PoseText(const Eigen::Quaterniond& q_SB,
                      const Eigen::Vector3d& p_SB) {
   const Eigen::Matrix3d R_BS = q_SB.conjugate().toRotationMatrix();

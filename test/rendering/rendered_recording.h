@@ -43,7 +43,7 @@ class RenderedRecording {
   const Trajectory& trajectory() const { return *trajectory_; }
   const RenderOptions& options() const { return options_; }
   const ImuReadings& imu() const { return imu_; }
-  // Of the second IMU, if the rig has one.
+  // Readings of the second IMU, if the rig has one.
   const std::optional<ImuReadings>& imu1() const { return imu1_; }
   int cameras() const { return static_cast<int>(rig_.factory.cameras.size()); }
   int images() const { return static_cast<int>(stamps_ns_.size()); }

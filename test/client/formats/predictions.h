@@ -61,7 +61,8 @@ inline void ExpectSamePredictions(const Calibration& theta,
   }
 }
 
-// What both make of the readings of the second IMU, against the first.
+// Compares what both make of the readings of the second IMU, by the frame that
+// those of the first define.
 inline void ExpectSameSecondImu(const Calibration& theta,
                                 const Tool& tool,
                                 RandomValues* random) {

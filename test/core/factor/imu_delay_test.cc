@@ -33,7 +33,7 @@ TEST(ImuDelay, TheMotionChangesByTheRatesAtBothEnds) {
         -20'000'000, 120'000'000, 1'000'000, imu, y0.b_a, y0.b_g, kGravity);
     const Preintegration whole =
         Preintegrate(samples, y0.t_ns, y1.t_ns, imu, y0.b_a, y0.b_g, {});
-    // What an ideal IMU reads at the ends.
+    // Readings of an ideal IMU at the ends.
     const ImuSample a = motion.Reading(kBegin_ns, {}, zero, zero, kGravity);
     const ImuSample b = motion.Reading(kEnd_ns, {}, zero, zero, kGravity);
     Eigen::Matrix<double, 9, 1> expected;
