@@ -72,6 +72,7 @@ google::protobuf::Struct DiagnosisJson(const Diagnosis& diagnosis) {
     one["cause"] = Text(finding.cause);
     one["remedy"] = Text(finding.remedy);
     one["value"].set_number_value(finding.value);
+    one["imu"].set_number_value(finding.imu);
   }
   fields["checked"] = ListValue(diagnosis.checked);
   fields["not_checked"] = ListValue(diagnosis.not_checked);

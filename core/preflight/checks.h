@@ -48,6 +48,17 @@ void CheckAccelerometer(const Rig& rig,
                         const GyroResult& gyro,
                         Diagnosis* diagnosis);
 
+// All of these checks on the readings of a second IMU, which `theta` must have.
+// Its axes, units and gravity are checked with the motion that the first one
+// measures, if `first_is_right`: nothing but single samples or the time offset
+// was found wrong.
+void CheckSecondImu(const Rig& rig,
+                    const Calibration& theta,
+                    std::span<const MotionSegment> segments,
+                    const GyroResult& first,
+                    bool first_is_right,
+                    Diagnosis* diagnosis);
+
 // Extrinsics, intrinsics and the frame of the landmarks.
 void CheckReprojection(const Rig& rig,
                        const Calibration& theta,

@@ -12,12 +12,23 @@
 namespace selfcal {
 namespace {
 
-// Whether the motion in the image can be predicted in spite of a finding.
-bool LeavesMotion(FindingKind kind) {
-  return kind == FindingKind::kTimeOffset || kind == FindingKind::kClockDrift ||
-         kind == FindingKind::kDroppedSamples ||
-         kind == FindingKind::kRepeatedSamples ||
-         kind == FindingKind::kSaturation;
+// Whether the motion can be predicted by the first IMU in spite of what is
+// found.
+bool LeavesMotion(const Diagnosis& diagnosis) {
+  return std::all_of(diagnosis.findings.begin(),
+                     diagnosis.findings.end(),
+                     [](const Finding& finding) {
+                       switch (finding.kind) {
+                         case FindingKind::kTimeOffset:
+                         case FindingKind::kClockDrift:
+                         case FindingKind::kDroppedSamples:
+                         case FindingKind::kRepeatedSamples:
+                         case FindingKind::kSaturation:
+                           return true;
+                         default:
+                           return finding.imu == 1;
+                       }
+                     });
 }
 
 // The median of the segments.
@@ -84,10 +95,12 @@ Diagnosis Diagnose(const Rig& rig,
   const GyroResult gyro = CheckGyro(theta, data, &diagnosis);
   CheckClocks(theta, segments, &diagnosis);
   CheckAccelerometer(rig, theta, data, gyro, &diagnosis);
+  if (theta.imu1) {
+    CheckSecondImu(
+        rig, theta, segments, gyro, LeavesMotion(diagnosis), &diagnosis);
+  }
   CheckReprojection(rig, theta, segments, &diagnosis);
-  if (std::all_of(diagnosis.findings.begin(),
-                  diagnosis.findings.end(),
-                  [](const Finding& one) { return LeavesMotion(one.kind); })) {
+  if (LeavesMotion(diagnosis)) {
     CheckShutter(rig, theta, segments, &diagnosis);
   } else {
     diagnosis.not_checked.push_back("shutter: not before the above is correct");

@@ -57,6 +57,7 @@ struct Finding {
   // samples that are dropped, repeated or saturated; otherwise the ratio of the
   // error of the data as sent to that of the explanation.
   double value = 0;
+  int imu = 0;  // whose readings it is about; 1 is the second IMU
 };
 
 struct Diagnosis {

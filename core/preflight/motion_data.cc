@@ -14,23 +14,6 @@ constexpr double kMinInterval_s = 0.25;
 constexpr double kMaxInterval_s = 3;
 constexpr std::size_t kMaxIntervals = 2000;
 
-bool Finite(const KeyframeState& state) {
-  return state.q_GI.coeffs().allFinite() && state.q_GI.norm() > 0.5 &&
-         state.p_GI.allFinite() && state.v_GI.allFinite() &&
-         state.b_a.allFinite() && state.b_g.allFinite();
-}
-
-std::vector<ImuSample> UsableSamples(const MotionSegment& segment) {
-  std::vector<ImuSample> samples;
-  samples.reserve(segment.imu.size());
-  for (const ImuSample& sample : segment.imu) {
-    if (!sample.gyro.allFinite() || !sample.accel.allFinite()) continue;
-    if (!samples.empty() && sample.t_ns <= samples.back().t_ns) continue;
-    samples.push_back(sample);
-  }
-  return samples;
-}
-
 void CollectIntervals(const std::vector<KeyframeState>& keyframes,
                       std::size_t segment,
                       std::vector<MotionInterval>* intervals) {
@@ -41,7 +24,8 @@ void CollectIntervals(const std::vector<KeyframeState>& keyframes,
     const double dt_s = 1e-9 * static_cast<double>(b.t_ns - a.t_ns);
     if (dt_s >= 0 && dt_s < kMinInterval_s) continue;
     from = k;
-    if (dt_s < 0 || dt_s > kMaxInterval_s || !Finite(a) || !Finite(b)) continue;
+    if (dt_s < 0 || dt_s > kMaxInterval_s || !IsFinite(a) || !IsFinite(b))
+      continue;
     const Eigen::Quaterniond turn =
         a.q_GI.normalized().conjugate() * b.q_GI.normalized();
     intervals->push_back({segment, a, b, dt_s, Log(turn)});
@@ -50,11 +34,28 @@ void CollectIntervals(const std::vector<KeyframeState>& keyframes,
 
 }  // namespace
 
+bool IsFinite(const KeyframeState& state) {
+  return state.q_GI.coeffs().allFinite() && state.q_GI.norm() > 0.5 &&
+         state.p_GI.allFinite() && state.v_GI.allFinite() &&
+         state.b_a.allFinite() && state.b_g.allFinite();
+}
+
+std::vector<ImuSample> UsableSamples(std::span<const ImuSample> samples) {
+  std::vector<ImuSample> usable;
+  usable.reserve(samples.size());
+  for (const ImuSample& sample : samples) {
+    if (!sample.gyro.allFinite() || !sample.accel.allFinite()) continue;
+    if (!usable.empty() && sample.t_ns <= usable.back().t_ns) continue;
+    usable.push_back(sample);
+  }
+  return usable;
+}
+
 MotionData CollectMotion(std::span<const MotionSegment> segments) {
   MotionData data;
   std::vector<MotionInterval> all;
   for (const MotionSegment& segment : segments) {
-    data.imu.push_back(UsableSamples(segment));
+    data.imu.push_back(UsableSamples(segment.imu));
     if (data.imu.back().size() < 2) continue;
     CollectIntervals(segment.keyframes, data.imu.size() - 1, &all);
     if (segment.keyframes.empty()) continue;

@@ -30,6 +30,12 @@ struct MotionData {
   double session_s = 0;
 };
 
+// True if the state can be used.
+bool IsFinite(const KeyframeState& state);
+
+// Samples that are finite and later than the previous ones.
+std::vector<ImuSample> UsableSamples(std::span<const ImuSample> samples);
+
 // Collects intervals of at least a quarter of a second, for which the relative
 // accuracy of a SLAM system's rotation is better than for shorter ones, and of
 // at most three seconds. Long data is subsampled evenly to about 2000

@@ -205,8 +205,13 @@ void CheckNoise(const CheckContext& context,
   }
 }
 
-bool EstimatesTimeOffset(const Rig& rig) {
-  return std::ranges::count(EstimatedTimeOffsets(rig), 1) > 0;
+// True if the time offset of a camera, or that of the second IMU, is estimated.
+bool EstimatesTimeOffset(const Rig& rig, int imu) {
+  if (imu == 0) return std::ranges::count(EstimatedTimeOffsets(rig), 1) > 0;
+  const auto components = TangentComponents(rig.factory);
+  return std::ranges::any_of(FreeComponents(rig), [&](int i) {
+    return components[i].name == "imu1.time_offset";
+  });
 }
 
 // True if the finding biases the calibration. Lost, repeated and saturated
@@ -220,11 +225,12 @@ bool Biases(const CheckContext& context, const Finding& finding) {
     case FindingKind::kSaturation:
       return false;
     case FindingKind::kTimeOffset:
-      return !EstimatesTimeOffset(context.rig) &&
-             !IsStatedOffset(context.result.theta,
-                             context.evidence.diagnosis->session_s,
-                             finding.value,
-                             kLeastTimeOffset_s);
+      return !EstimatesTimeOffset(context.rig, finding.imu) &&
+             (finding.imu == 1 ||
+              !IsStatedOffset(context.result.theta,
+                              context.evidence.diagnosis->session_s,
+                              finding.value,
+                              kLeastTimeOffset_s));
     default:
       return true;
   }

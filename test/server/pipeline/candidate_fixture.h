@@ -15,7 +15,7 @@ namespace selfcal::server {
 
 class CandidateTest : public ::testing::Test {
  protected:
-  CandidateTest() {
+  explicit CandidateTest(const Rig& rig = TestRig("a")) : rig_(rig) {
     const Eigen::VectorXd prior = PriorSigmas(rig_);
     StoredCalibration& active = evidence_.active;
     active.version = 4;
@@ -74,7 +74,7 @@ class CandidateTest : public ::testing::Test {
         {kind, "the stamps are 19 ms early", "add 19 ms", 0.019});
   }
 
-  Rig rig_ = TestRig("a");
+  Rig rig_;
   CandidateEvidence evidence_;
   CalibrationResult result_;
 };

@@ -149,6 +149,27 @@ TEST_F(CandidateTest, AFindingOfThePreflightRejectsWithItsRemedy) {
   EXPECT_EQ(OutcomeOf("preflight"), CheckOutcome::kPassed);
 }
 
+Rig TwoImuRig() {
+  Rig rig = TestRig("a");
+  AddSecondImu(&rig);
+  return rig;
+}
+
+class TwoImuCandidateTest : public CandidateTest {
+ protected:
+  TwoImuCandidateTest() : CandidateTest(TwoImuRig()) {}
+};
+
+TEST_F(TwoImuCandidateTest, ATimeOffsetRejectsUnlessItIsEstimated) {
+  Find(FindingKind::kTimeOffset);
+  evidence_.diagnosis->findings.back().imu = 1;
+  // That of a camera is another one.
+  rig_.blocks = {{"cam0.time_offset", true}};
+  EXPECT_THAT(Problem("preflight"), HasSubstr("19 ms early"));
+  rig_.blocks = {{"imu1.time_offset", true}};
+  EXPECT_EQ(OutcomeOf("preflight"), CheckOutcome::kPassed);
+}
+
 TEST_F(CandidateTest, LostSamplesAreNoted) {
   Find(FindingKind::kDroppedSamples);
   EXPECT_THAT(Problems(), IsEmpty());
