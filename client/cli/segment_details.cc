@@ -58,6 +58,20 @@ int Information(Context* context, const SegmentOptions& options) {
   return kDone;
 }
 
+void AddInertialRms(const std::string& prefix,
+                    const google::protobuf::RepeatedField<double>& rms,
+                    Facts* facts) {
+  constexpr const char* kKinds[] = {"rotation",
+                                    "velocity",
+                                    "position",
+                                    "accelerometer bias",
+                                    "gyroscope bias"};
+  for (int k = 0; k < rms.size() && k < 5; ++k) {
+    facts->Add(prefix + kKinds[k],
+               fmt::format("{:.2f} standard deviations rms", rms.Get(k)));
+  }
+}
+
 int Residuals(Context* context, const SegmentOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::GetSegmentResidualsRequest request;
@@ -82,16 +96,8 @@ int Residuals(Context* context, const SegmentOptions& options) {
   }
   facts.Add("median",
             fmt::format("{:.3f} px", residuals.reprojection_median_px()));
-  constexpr const char* kKinds[] = {"rotation",
-                                    "velocity",
-                                    "position",
-                                    "accelerometer bias",
-                                    "gyroscope bias"};
-  for (int k = 0; k < residuals.inertial_rms_size() && k < 5; ++k) {
-    facts.Add(kKinds[k],
-              fmt::format("{:.2f} standard deviations rms",
-                          residuals.inertial_rms(k)));
-  }
+  AddInertialRms("", residuals.inertial_rms(), &facts);
+  AddInertialRms("second IMU: ", residuals.imu1_inertial_rms(), &facts);
   context->Print(facts);
   return kDone;
 }

@@ -1,11 +1,13 @@
 #include "core/information/segment_residuals.h"
 
 #include <cmath>
+#include <span>
 
 #include "core/factor/keyframe_motion.h"
 #include "core/factor/reprojection.h"
 #include "core/information/inliers.h"
 #include "core/information/observation_order.h"
+#include "core/model/second_imu.h"
 #include "core/model/temperature.h"
 
 namespace selfcal {
@@ -38,25 +40,32 @@ std::vector<ObservationResidual> Reprojections(
 
 std::vector<IntervalResidual> Intervals(const Rig& rig,
                                         const Calibration& theta,
-                                        const MotionSegment& segment) {
+                                        const MotionSegment& segment,
+                                        int imu) {
+  const std::span<const ImuSample> samples =
+      imu == 0 ? SamplesFromFirstKeyframe(segment)
+               : SecondSamplesFromFirstKeyframe(segment);
   std::vector<IntervalResidual> intervals;
   for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
     InertialMatrix covariance;
     IntervalResidual& interval = intervals.emplace_back();
-    interval.residual = EvaluateInertial(SamplesFromFirstKeyframe(segment),
-                                         segment.keyframes[k],
-                                         segment.keyframes[k + 1],
-                                         theta.imu,
-                                         rig.imu_noise,
-                                         rig.gravity_mps2,
-                                         nullptr,
-                                         &covariance);
+    interval.residual =
+        EvaluateInertial(samples,
+                         StateOfImu(theta, imu, segment.keyframes[k]),
+                         StateOfImu(theta, imu, segment.keyframes[k + 1]),
+                         ImuOf(theta, imu),
+                         NoiseOfImu(rig, imu),
+                         rig.gravity_mps2,
+                         nullptr,
+                         &covariance);
     interval.whitened = SquareRootInformation(covariance) * interval.residual;
   }
   return intervals;
 }
 
-std::vector<double> RootMeanSquares(
+}  // namespace
+
+std::vector<double> InertialRms(
     const std::vector<IntervalResidual>& intervals) {
   std::vector<double> rms(kKinds, 0);
   for (const IntervalResidual& interval : intervals) {
@@ -69,8 +78,6 @@ std::vector<double> RootMeanSquares(
   }
   return rms;
 }
-
-}  // namespace
 
 SegmentResiduals EvaluateResiduals(const Rig& rig,
                                    const Calibration& theta,
@@ -85,9 +92,13 @@ SegmentResiduals EvaluateResiduals(const Rig& rig,
       *theta_s, rig.pixel_sigma_px, segment, motions, order, options);
   SegmentResiduals residuals;
   residuals.observations = Reprojections(*theta_s, segment, motions, selected);
-  residuals.intervals = Intervals(rig, *theta_s, segment);
+  residuals.intervals = Intervals(rig, *theta_s, segment, 0);
+  if (theta_s->imu1) {
+    const StartedSegment started(*theta_s, segment);
+    residuals.second_intervals = Intervals(rig, *theta_s, *started, 1);
+  }
   residuals.statistics = selected.statistics;
-  residuals.statistics.inertial_rms = RootMeanSquares(residuals.intervals);
+  residuals.statistics.inertial_rms = InertialRms(residuals.intervals);
   return residuals;
 }
 

@@ -33,7 +33,10 @@ struct IntervalResidual {
 
 struct SegmentResiduals {
   std::vector<ObservationResidual> observations;  // as in the segment
-  std::vector<IntervalResidual> intervals;
+  std::vector<IntervalResidual> intervals;        // of the first IMU
+  // Of the second IMU; empty without one. StartSecondImu starts its velocity
+  // and biases.
+  std::vector<IntervalResidual> second_intervals;
   ResidualStatistics statistics;  // as in a score
 };
 
@@ -43,5 +46,9 @@ SegmentResiduals EvaluateResiduals(const Rig& rig,
                                    const Calibration& theta,
                                    const MotionSegment& segment,
                                    const ScoreOptions& options = {});
+
+// Root mean squares of the whitened residuals, in the order of the parts.
+// `intervals` must not be empty.
+std::vector<double> InertialRms(const std::vector<IntervalResidual>& intervals);
 
 }  // namespace selfcal

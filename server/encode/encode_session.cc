@@ -63,6 +63,20 @@ v1::SegmentInformation Encode(const Rig& rig,
   return message;
 }
 
+namespace {
+
+void Encode(const std::vector<IntervalResidual>& intervals,
+            v1::SegmentResiduals::Intervals* message) {
+  for (const IntervalResidual& interval : intervals) {
+    for (int j = 0; j < interval.residual.size(); ++j) {
+      message->add_residual(interval.residual[j]);
+      message->add_whitened(interval.whitened[j]);
+    }
+  }
+}
+
+}  // namespace
+
 v1::SegmentResiduals Encode(const SegmentResiduals& residuals,
                             const MotionSegment& segment,
                             int cameras) {
@@ -89,16 +103,16 @@ v1::SegmentResiduals Encode(const SegmentResiduals& residuals,
     camera.set_inlier_rms_px(
         std::sqrt(camera.inlier_rms_px() / std::max(1, camera.inliers())));
   }
-  for (const IntervalResidual& interval : residuals.intervals) {
-    for (int j = 0; j < interval.residual.size(); ++j) {
-      message.mutable_intervals()->add_residual(interval.residual[j]);
-      message.mutable_intervals()->add_whitened(interval.whitened[j]);
-    }
-  }
+  Encode(residuals.intervals, message.mutable_intervals());
   message.set_reprojection_median_px(
       residuals.statistics.reprojection_median_px);
   for (const double rms : residuals.statistics.inertial_rms) {
     message.add_inertial_rms(rms);
+  }
+  if (residuals.second_intervals.empty()) return message;
+  Encode(residuals.second_intervals, message.mutable_imu1_intervals());
+  for (const double rms : InertialRms(residuals.second_intervals)) {
+    message.add_imu1_inertial_rms(rms);
   }
   return message;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/factor/inertial_batch.h"
+#include "core/model/so3.h"
 #include "test/core/information/test_segments.h"
 
 namespace selfcal {
@@ -88,6 +89,35 @@ TEST(SegmentResiduals, IntervalsAreWhitenedAsTheScoreWhitensThem) {
           << "interval " << k << ", " << j;
     }
   }
+}
+
+// A second IMU whose pose and intrinsics are those that are stated leaves what
+// its noise explains; one that is turned does not.
+TEST(SegmentResiduals, OfASecondImuAreThoseOfItsOwnReadings) {
+  Rig rig = HandheldRig("handheld");
+  EXPECT_TRUE(
+      EvaluateResiduals(
+          rig,
+          rig.factory,
+          OneSegment(rig, rig.factory, *MakeHandheld(4.1, 1, 1), {}).truth)
+          .second_intervals.empty());
+  AddSecondImu(&rig);
+  const MotionSegment segment =
+      OneSegment(rig, rig.factory, *MakeHandheld(4.1, 1, 1), {}).truth;
+  const SegmentResiduals residuals =
+      EvaluateResiduals(rig, rig.factory, segment);
+  ASSERT_EQ(residuals.second_intervals.size(), segment.keyframes.size() - 1);
+  const std::vector<double> right = InertialRms(residuals.second_intervals);
+  Calibration turned = rig.factory;
+  turned.imu1->q_JI = turned.imu1->q_JI * Exp({0.05, 0, 0});
+  const std::vector<double> wrong =
+      InertialRms(EvaluateResiduals(rig, turned, segment).second_intervals);
+  ASSERT_EQ(right.size(), 5u);
+  // Rotation and position; biases are constant in each segment.
+  EXPECT_LT(right[0], 1.5);
+  EXPECT_GT(wrong[0], 3 * right[0]);
+  EXPECT_EQ(right[3], 0);
+  EXPECT_EQ(right[4], 0);
 }
 
 // One that was moved manually: its residual is the displacement.

@@ -141,6 +141,18 @@ TEST_F(DaemonTest, ASecondImuComesOverTheWireIntoAVersion) {
                             return estimate.component().starts_with("imu1.");
                           }),
             22);
+  v1::GetSegmentResidualsRequest of_segment;
+  of_segment.set_name("rigs/r/segments/s~0");
+  grpc::ClientContext residuals_context;
+  v1::SegmentResiduals residuals;
+  const grpc::Status read =
+      v1::SegmentService::NewStub(channel_)->GetSegmentResiduals(
+          &residuals_context, of_segment, &residuals);
+  ASSERT_TRUE(read.ok()) << read.error_message();
+  EXPECT_GT(residuals.intervals().whitened_size(), 0);
+  EXPECT_EQ(residuals.imu1_intervals().whitened_size(),
+            residuals.intervals().whitened_size());
+  EXPECT_EQ(residuals.imu1_inertial_rms_size(), 5);
 }
 
 // Scores by Ceres in the daemon; the checks in processes of their own.

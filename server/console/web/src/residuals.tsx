@@ -1,7 +1,7 @@
 // The residuals of a segment: of its observations and between its keyframes.
 import { useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
-import type { SegmentResiduals } from './contract';
+import type { SegmentResiduals, SegmentResiduals_Intervals } from './contract';
 import type { SegmentData } from './segment_data';
 import { kDegrees, number } from './format';
 import { Choice } from './parts';
@@ -92,10 +92,10 @@ const kAxes = ['x', 'y', 'z'].map((label, i) => ({ label, stroke: kColours[i], w
 
 function intervalsOf(
   segment: SegmentData,
-  residuals: SegmentResiduals,
+  intervals: SegmentResiduals_Intervals,
   part: string,
 ): uPlot.AlignedData {
-  const { whitened, residual } = residuals.intervals!;
+  const { whitened, residual } = intervals;
   const seconds = secondsOf(segment.keyframes.tNs).slice(0, -1);
   const three = (of: number[], k: number, kind: number) =>
     of.slice(kSize * k + 3 * kind, kSize * k + 3 * kind + 3);
@@ -117,8 +117,11 @@ function intervalsOf(
 
 function Intervals(props: Shown) {
   const [part, setPart] = useState(kWhitened);
+  const [imu, setImu] = useState('0');
   const { data: segment, residuals } = props;
-  const data = useMemo(() => intervalsOf(segment, residuals, part), [segment, residuals, part]);
+  const second = residuals.imu1Intervals;
+  const intervals = imu === '1' && second ? second : residuals.intervals!;
+  const data = useMemo(() => intervalsOf(segment, intervals, part), [segment, intervals, part]);
   const whitened = part === kWhitened;
   const { name, unit } = whitened
     ? { name: 'all, in standard deviations', unit: 'sigmas' }
@@ -126,6 +129,17 @@ function Intervals(props: Shown) {
   return (
     <>
       <div class="bar">
+        {second && (
+          <Choice
+            label="IMU"
+            value={imu}
+            of={[
+              ['0', 'first'],
+              ['1', 'second'],
+            ]}
+            onChoice={setImu}
+          />
+        )}
         <Choice
           label="IMU residuals between keyframes"
           value={part}
@@ -152,8 +166,9 @@ function Intervals(props: Shown) {
 }
 
 function InWords(props: { of: SegmentResiduals }) {
-  const { cameras, inertialRms, calibrationVersion, notProjectable } = props.of;
-  const kinds = kParts.map((part, i) => `${part.name} ${number(inertialRms[i] ?? NaN)}`).join(', ');
+  const { cameras, inertialRms, imu1InertialRms, calibrationVersion, notProjectable } = props.of;
+  const kinds = (rms: number[]) =>
+    kParts.map((part, i) => `${part.name} ${number(rms[i] ?? NaN)}`).join(', ');
   return (
     <>
       <ul>
@@ -167,7 +182,10 @@ function InWords(props: { of: SegmentResiduals }) {
         {notProjectable.length > 0 && (
           <li>{notProjectable.length} observations do not project and have no residual.</li>
         )}
-        {inertialRms.length > 0 && <li>IMU, root mean square in standard deviations: {kinds}.</li>}
+        {inertialRms.length > 0 && (
+          <li>IMU, root mean square in standard deviations: {kinds(inertialRms)}.</li>
+        )}
+        {imu1InertialRms.length > 0 && <li>Second IMU: {kinds(imu1InertialRms)}.</li>}
       </ul>
       <p class="quiet">
         At version {calibrationVersion}, with the states that the client's SLAM system sent;
