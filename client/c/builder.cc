@@ -72,6 +72,26 @@ absl::Status Run(selfcal::client::SegmentBuilder* builder,
   return accepted ? absl::OkStatus() : absl::OutOfRangeError(refusal);
 }
 
+using AddSampleMethod = bool (selfcal::client::SegmentBuilder::*)(
+    const selfcal::ImuSample&) noexcept;
+
+int32_t AddSample(AddSampleMethod method,
+                  selfcal_builder* builder,
+                  const selfcal_imu_sample* sample,
+                  selfcal_error* error) {
+  return Guarded(error, [&] {
+    if (auto s = RequireNotNull(builder, "builder"); !s.ok()) return s;
+    if (auto s = RequireNotNull(sample, "sample"); !s.ok()) return s;
+    return Run(
+        &builder->builder,
+        "sample.t_ns: is not later than that of the sample before it",
+        [&] {
+          return (builder->builder.*method)(
+              {sample->t_ns, ToVector(sample->gyro), ToVector(sample->accel)});
+        });
+  });
+}
+
 }  // namespace
 
 int32_t selfcal_builder_create(const selfcal_builder_options* options,
@@ -97,17 +117,15 @@ void selfcal_builder_destroy(selfcal_builder* builder) { delete builder; }
 int32_t selfcal_builder_add_imu(selfcal_builder* builder,
                                 const selfcal_imu_sample* sample,
                                 selfcal_error* error) {
-  return Guarded(error, [&] {
-    if (auto s = RequireNotNull(builder, "builder"); !s.ok()) return s;
-    if (auto s = RequireNotNull(sample, "sample"); !s.ok()) return s;
-    return Run(
-        &builder->builder,
-        "sample.t_ns: is not later than that of the sample before it",
-        [&] {
-          return builder->builder.AddImu(
-              {sample->t_ns, ToVector(sample->gyro), ToVector(sample->accel)});
-        });
-  });
+  return AddSample(
+      &selfcal::client::SegmentBuilder::AddImu, builder, sample, error);
+}
+
+int32_t selfcal_builder_add_second_imu(selfcal_builder* builder,
+                                       const selfcal_imu_sample* sample,
+                                       selfcal_error* error) {
+  return AddSample(
+      &selfcal::client::SegmentBuilder::AddSecondImu, builder, sample, error);
 }
 
 int32_t selfcal_builder_add_keyframe(selfcal_builder* builder,

@@ -207,6 +207,13 @@ int32_t selfcal_builder_add_imu(selfcal_builder* builder,
                                 const selfcal_imu_sample* sample,
                                 selfcal_error* error);
 
+// The same of a second IMU, for a rig that has one. Once a sample was added,
+// segments wait for its samples as for those of the first one, and keyframes
+// that they do not cover are dropped.
+int32_t selfcal_builder_add_second_imu(selfcal_builder* builder,
+                                       const selfcal_imu_sample* sample,
+                                       selfcal_error* error);
+
 // Adds a keyframe with `count` observations, which may be NULL if there are
 // none. If a camera observes a landmark several times, the first observation is
 // used; the last p_G of a landmark within the segment is sent.

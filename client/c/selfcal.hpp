@@ -342,6 +342,15 @@ class Builder {
         error);
   }
 
+  // The same of a second IMU (selfcal_builder_add_second_imu).
+  bool AddSecondImu(const ImuSample& sample) {
+    selfcal_error error;
+    return internal::Accepted(
+        selfcal_builder_add_second_imu(handle_.get(), &sample, &error),
+        SELFCAL_OUT_OF_RANGE,
+        error);
+  }
+
   // Returns false and refuses a keyframe that is not later than the one before,
   // or comes while the SLAM system is not healthy.
   bool AddKeyframe(const KeyframeState& state,

@@ -108,7 +108,8 @@ int ShowPreset(const Context& context, const std::string& name) {
 
 void AddImuPresets(CLI::App* rig, Context* context) {
   CLI::App* presets = rig->add_subcommand(
-      "presets", "List the IMUs that rig create --imu-preset knows");
+      "presets",
+      "List the IMUs that --imu-preset and --imu1-preset of rig create know");
   const auto name = std::make_shared<std::string>();
   presets->add_option(
       "PRESET", *name, "Only this one, with the sources of its values");

@@ -121,9 +121,9 @@ absl::Status SetSelection(const std::string& text, v1::Rig* rig) {
 
 // Puts the tolerances before those of the file, which are of single components
 // and take precedence.
-void SetImuTolerances(ImuGrade grade, v1::Rig* rig) {
+void SetImuTolerances(ImuGrade grade, const std::string& imu, v1::Rig* rig) {
   google::protobuf::RepeatedPtrField<v1::ComponentSetting> settings;
-  for (const ComponentSetting& tolerance : ImuTolerances(grade)) {
+  for (const ComponentSetting& tolerance : ImuTolerances(grade, imu)) {
     v1::ComponentSetting* added = settings.Add();
     added->set_pattern(tolerance.pattern);
     added->set_value(tolerance.value);
@@ -140,17 +140,22 @@ absl::StatusOr<ImuGrade> ReadGrade(const std::string& text) {
       DidYouMean(text, {"consumer", "factory-calibrated", "unknown"})));
 }
 
+// Noise and full scale, as those of a first IMU.
+v1::Rig ToProto(const ImuPreset& preset) {
+  Rig rig;
+  rig.imu_noise = preset.noise;
+  rig.imu_full_scale = preset.full_scale;
+  return selfcal::ToProto(rig);
+}
+
 // Noise and full scale of the preset replace those of the file.
 absl::StatusOr<const ImuPreset*> SetImuPreset(const std::string& name,
                                               v1::Rig* rig) {
   const ImuPreset* const preset = FindImuPreset(name);
   if (preset == nullptr) return UnknownImuPreset("--imu-preset: ", name);
-  Rig values;
-  values.imu_noise = preset->noise;
-  values.imu_full_scale = preset->full_scale;
-  const v1::Rig message = ToProto(values);
-  *rig->mutable_imu_noise() = message.imu_noise();
-  *rig->mutable_imu() = message.imu();
+  const v1::Rig values = ToProto(*preset);
+  *rig->mutable_imu_noise() = values.imu_noise();
+  *rig->mutable_imu() = values.imu();
   return preset;
 }
 
@@ -167,7 +172,26 @@ absl::Status SetImu(const RigInput& input, v1::Rig* rig) {
     if (!given.ok()) return given.status();
     grade = *given;
   }
-  if (grade) SetImuTolerances(*grade, rig);
+  if (grade) SetImuTolerances(*grade, "imu", rig);
+  return absl::OkStatus();
+}
+
+// Noise, full scale and tolerances of the second IMU.
+absl::Status SetSecondImu(const RigInput& input, v1::Rig* rig) {
+  if (!input.imu1_preset) return absl::OkStatus();
+  constexpr char kFlag[] = "--imu1-preset: ";
+  if (!rig->factory().has_imu1()) {
+    return absl::InvalidArgumentError(
+        fmt::format("{}the rig has no second IMU: state its pose as "
+                    "factory.imu1, or in imu1.yaml of --from kalibr",
+                    kFlag));
+  }
+  const ImuPreset* const preset = FindImuPreset(*input.imu1_preset);
+  if (preset == nullptr) return UnknownImuPreset(kFlag, *input.imu1_preset);
+  const v1::Rig values = ToProto(*preset);
+  *rig->mutable_imu1_noise() = values.imu_noise();
+  *rig->mutable_imu1() = values.imu();
+  SetImuTolerances(preset->grade, "imu1", rig);
   return absl::OkStatus();
 }
 
@@ -278,6 +302,8 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
   if (const absl::Status status = SetImu(input, &*rig); !status.ok()) {
     return status;
   }
+  const absl::Status second = SetSecondImu(input, &*rig);
+  if (!second.ok()) return second;
   const absl::Status sigmas = AddPriorSigmas(input, &*rig);
   if (!sigmas.ok()) return sigmas;
   if (input.table_size) rig->set_table_size(*input.table_size);

@@ -40,7 +40,8 @@ struct RigInput {
   std::optional<double> gravity_mps2;
   std::optional<std::string> imu;  // a grade, as ParseImuGrade() reads it
   std::optional<std::string> imu_preset;  // as FindImuPreset() finds it
-  std::optional<std::string> selection;   // as SelectionText()
+  std::optional<std::string> imu1_preset;
+  std::optional<std::string> selection;  // as SelectionText()
   std::optional<int> table_size;
   std::optional<double> min_gain_nats;
   std::optional<double> retrigger_fraction;

@@ -107,6 +107,9 @@ void AddImuOptions(CLI::App* create, RigInput* input) {
                      "Noise, full scale and tolerances of this part, e.g. "
                      "bmi088, instead of those of the file; other options "
                      "take precedence; `selfcal rig presets` lists the parts");
+  create->add_option("--imu1-preset",
+                     input->imu1_preset,
+                     "The same for the second IMU of the file");
   create->add_option("--imu",
                      input->imu,
                      "Tolerances of the IMU: consumer (scales to 2 %, angles "

@@ -1,17 +1,16 @@
 #include "core/model/imu_grades.h"
 
-#include <string>
-
 #include "core/model/parameter_blocks.h"
 
 namespace selfcal {
 namespace {
 
-std::vector<ComponentSetting> Tolerances(double GradeTolerance::*grade) {
+std::vector<ComponentSetting> Tolerances(double GradeTolerance::*grade,
+                                         const std::string& imu) {
   std::vector<ComponentSetting> settings;
   for (const auto& block : kImuBlocks) {
     if (block.info.tolerance.*grade == 0) continue;
-    settings.push_back({"imu." + std::string(block.info.name) + ".*",
+    settings.push_back({imu + "." + std::string(block.info.name) + ".*",
                         block.info.tolerance.*grade});
   }
   return settings;
@@ -40,12 +39,13 @@ std::string_view ImuGradeName(ImuGrade grade) {
   return "unknown";
 }
 
-std::vector<ComponentSetting> ImuTolerances(ImuGrade grade) {
+std::vector<ComponentSetting> ImuTolerances(ImuGrade grade,
+                                            const std::string& imu) {
   switch (grade) {
     case ImuGrade::kConsumer:
-      return Tolerances(&GradeTolerance::consumer);
+      return Tolerances(&GradeTolerance::consumer, imu);
     case ImuGrade::kFactoryCalibrated:
-      return Tolerances(&GradeTolerance::factory_calibrated);
+      return Tolerances(&GradeTolerance::factory_calibrated, imu);
     case ImuGrade::kUnknown:
       break;
   }

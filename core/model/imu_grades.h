@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -27,7 +28,9 @@ enum class ImuGrade {
 std::optional<ImuGrade> ParseImuGrade(std::string_view text);
 std::string_view ImuGradeName(ImuGrade grade);
 
-// Prior standard deviations of the IMU's components, for Rig::prior_sigmas.
-std::vector<ComponentSetting> ImuTolerances(ImuGrade grade);
+// Prior standard deviations of the components of an IMU, "imu" or "imu1", for
+// Rig::prior_sigmas.
+std::vector<ComponentSetting> ImuTolerances(ImuGrade grade,
+                                            const std::string& imu = "imu");
 
 }  // namespace selfcal

@@ -101,6 +101,8 @@ TEST_F(ArgumentsTest, NullIsAnErrorOfEachFunctionThatHasErrors) {
       selfcal_builder_create(&walk, nullptr, e),
       selfcal_builder_add_imu(nullptr, &sample, e),
       selfcal_builder_add_imu(builder_, nullptr, e),
+      selfcal_builder_add_second_imu(nullptr, &sample, e),
+      selfcal_builder_add_second_imu(builder_, nullptr, e),
       selfcal_builder_add_keyframe(nullptr, &state, nullptr, 0, e),
       selfcal_builder_add_keyframe(builder_, nullptr, nullptr, 0, e),
       selfcal_builder_add_keyframe(builder_, &state, nullptr, 1, e),
@@ -245,6 +247,11 @@ TEST_F(ArgumentsTest, InputOutOfOrderIsRefusedAndCounted) {
   EXPECT_EQ(selfcal_builder_add_imu(builder_, &sample, &error_),
             SELFCAL_OUT_OF_RANGE);
   EXPECT_THAT(error_.message, HasSubstr("not later"));
+  // The second IMU has an order of its own.
+  EXPECT_EQ(selfcal_builder_add_second_imu(builder_, &sample, nullptr),
+            SELFCAL_OK);
+  EXPECT_EQ(selfcal_builder_add_second_imu(builder_, &sample, &error_),
+            SELFCAL_OUT_OF_RANGE);
   selfcal_keyframe_state state = {};
   EXPECT_EQ(selfcal_builder_add_keyframe(builder_, &state, nullptr, 0, nullptr),
             SELFCAL_OK);
@@ -256,7 +263,7 @@ TEST_F(ArgumentsTest, InputOutOfOrderIsRefusedAndCounted) {
   counts.struct_size = sizeof(counts);
   ASSERT_EQ(selfcal_builder_get_statistics(builder_, &counts, nullptr),
             SELFCAL_OK);
-  EXPECT_EQ(counts.imu_ignored, 1u);
+  EXPECT_EQ(counts.imu_ignored, 2u);
   EXPECT_EQ(counts.keyframes_refused, 1u);
 }
 

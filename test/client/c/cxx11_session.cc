@@ -41,11 +41,15 @@ Cxx11Outcome StreamInCxx11(const std::string& target, const Session& session) {
     for (; sample != session.imu.end() && sample->t_ns <= keyframe.state.t_ns;
          ++sample) {
       builder.AddImu(*sample);
+      builder.AddSecondImu(*sample);
     }
     builder.AddKeyframe(keyframe.state, keyframe.observations);
     while (Segment segment = builder.Take()) stream.Send(std::move(segment));
   }
-  for (; sample != session.imu.end(); ++sample) builder.AddImu(*sample);
+  for (; sample != session.imu.end(); ++sample) {
+    builder.AddImu(*sample);
+    builder.AddSecondImu(*sample);
+  }
   builder.Flush(2);
   while (Segment segment = builder.Take()) stream.Send(std::move(segment));
   outcome.drained = stream.Drain(std::chrono::seconds(60)).code();

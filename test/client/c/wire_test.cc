@@ -68,6 +68,15 @@ void Send(client::SegmentBuilder* builder, client::SegmentStream* stream) {
 
 Eigen::Vector3d Vector(const double (&v)[3]) { return Eigen::Vector3d(v); }
 
+// A second IMU that reads the same.
+void AddBoth(const selfcal_imu_sample& sample,
+             client::SegmentBuilder* builder) {
+  const ImuSample converted = {
+      sample.t_ns, Vector(sample.gyro), Vector(sample.accel)};
+  builder->AddImu(converted);
+  builder->AddSecondImu(converted);
+}
+
 void StreamInCxx20(const std::string& target, const Session& session) {
   client::ClientOptions options;
   options.target = target;
@@ -82,8 +91,7 @@ void StreamInCxx20(const std::string& target, const Session& session) {
   for (const Keyframe& keyframe : session.keyframes) {
     const selfcal_keyframe_state& x = keyframe.state;
     for (; sample != session.imu.end() && sample->t_ns <= x.t_ns; ++sample) {
-      builder.AddImu(
-          {sample->t_ns, Vector(sample->gyro), Vector(sample->accel)});
+      AddBoth(*sample, &builder);
     }
     KeyframeState state;
     state.t_ns = x.t_ns;
@@ -103,7 +111,7 @@ void StreamInCxx20(const std::string& target, const Session& session) {
     Send(&builder, &stream);
   }
   for (; sample != session.imu.end(); ++sample) {
-    builder.AddImu({sample->t_ns, Vector(sample->gyro), Vector(sample->accel)});
+    AddBoth(*sample, &builder);
   }
   builder.Flush(2);
   Send(&builder, &stream);
@@ -138,6 +146,7 @@ void StreamInC(const std::string& target, const Session& session) {
     for (; sample != session.imu.end() && sample->t_ns <= keyframe.state.t_ns;
          ++sample) {
       selfcal_builder_add_imu(builder, &*sample, nullptr);
+      selfcal_builder_add_second_imu(builder, &*sample, nullptr);
     }
     selfcal_builder_add_keyframe(builder,
                                  &keyframe.state,
@@ -148,6 +157,7 @@ void StreamInC(const std::string& target, const Session& session) {
   }
   for (; sample != session.imu.end(); ++sample) {
     selfcal_builder_add_imu(builder, &*sample, nullptr);
+    selfcal_builder_add_second_imu(builder, &*sample, nullptr);
   }
   selfcal_builder_flush(builder, 2, nullptr);
   Send(builder, stream);
@@ -196,6 +206,9 @@ TEST(Wire, WhatTheDaemonGetsIsWhatWasGiven) {
   EXPECT_EQ(keyframes.q_gi(9), 0.16);
   EXPECT_EQ(keyframes.q_gi(10), -0.72);
   EXPECT_EQ(keyframes.q_gi(11), 0.49);
+  ASSERT_GT(request.segment().imu().t_ns_size(), 12);
+  EXPECT_EQ(request.segment().imu1().SerializeAsString(),
+            request.segment().imu().SerializeAsString());
 }
 
 }  // namespace

@@ -20,8 +20,13 @@ using testing::Not;
 class RigCreate : public Commands {
  protected:
   // The files of kalibr for a rig with so many cameras, as arguments.
-  std::vector<std::string> FromKalibr(int cameras) const {
+  std::vector<std::string> FromKalibr(int cameras,
+                                      bool second_imu = false) const {
     Rig rig = ARig("device");
+    if (second_imu) {
+      rig.factory.imu1.emplace().p_JI.x() = 0.05;
+      rig.imu1_noise = rig.imu_noise;
+    }
     CameraCalibration camera = rig.factory.cameras[0];
     camera.model = DistortionModel::kEquidistant;
     camera.distortion = Eigen::Vector4d(0.1, 0.01, 0.001, 0.0001);
@@ -96,6 +101,28 @@ TEST_F(RigCreate, APresetSetsNoiseFullScaleAndTolerances) {
   ASSERT_GT(rig.prior_sigmas_size(), 0);
   EXPECT_EQ(rig.prior_sigmas(0).pattern(), "imu.gyro.scale.*");
   EXPECT_EQ(rig.prior_sigmas(0).value(), 0.02);
+}
+
+TEST_F(RigCreate, APresetOfTheSecondImuIsItsOwn) {
+  const std::string none =
+      Selfcal(With(FromKalibr(1), {"--imu1-preset", "bmi088"})).err;
+  EXPECT_THAT(none, HasSubstr("--imu1-preset: the rig has no second IMU"));
+  EXPECT_TRUE(daemon_.rigs.empty());
+  const Outcome created =
+      Selfcal(With(FromKalibr(1, true), {"--imu1-preset", "bmi088"}));
+  ASSERT_EQ(created.code, 0) << created.err;
+  const v1::Rig& rig = daemon_.rigs.back();
+  const ImuPreset& preset = *FindImuPreset("bmi088");
+  EXPECT_EQ(rig.imu1_noise().gyro_noise_density(),
+            preset.noise.gyro_noise_density);
+  EXPECT_NE(rig.imu_noise().gyro_noise_density(),
+            preset.noise.gyro_noise_density);
+  EXPECT_EQ(rig.imu1().accel_max(), preset.full_scale.accel_mps2);
+  ASSERT_GT(rig.prior_sigmas_size(), 0);
+  EXPECT_EQ(rig.prior_sigmas(0).pattern(), "imu1.gyro.scale.*");
+  EXPECT_THAT(
+      Selfcal(With(FromKalibr(1, true), {"--imu1-preset", "bmi08"})).err,
+      HasSubstr("--imu1-preset: 'bmi08' must be one of"));
 }
 
 TEST_F(RigCreate, OtherOptionsTakePrecedenceOverAPreset) {
