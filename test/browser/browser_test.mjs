@@ -157,6 +157,21 @@ const tests = {
     await r.detail('segment');
   },
 
+  async 'the readings and residuals of a second IMU are shown'(r) {
+    await r.page.goto(`${r.base}/rigs/pair/segments/walk~0`);
+    await r.sees(/^Second IMU: rotation/);
+    const plot = r.page.getByRole('slider', { name: /^Angular rates/ });
+    const readings = () => plot.getAttribute('aria-valuetext');
+    const first = await readings();
+    await r.page.getByLabel(/^IMU(?! residuals)/).selectOption('second');
+    await until('the other readings', async () => (await readings()) !== first);
+    await r.picture('segment-second-imu');
+    // The cursor of a plot moves the time, whichever IMU is shown.
+    await plot.focus();
+    await r.page.keyboard.press('End');
+    await r.sees('keyframe 20 of 20');
+  },
+
   async 'a session shows its path, coloured by the entropy of its segments'(r) {
     await r.shows('/rigs/tablet/sessions', 'Sessions of tablet', ['walk'], 'sessions');
     await r.page.getByRole('link', { name: 'walk', exact: true }).click();

@@ -66,6 +66,14 @@ absl::Status AddDevice(Domain* domain, const std::string& id) {
   return absl::OkStatus();
 }
 
+// A device with a second IMU and one segment.
+absl::Status AddDeviceOfTwoImus(Domain* domain, const std::string& id) {
+  const SimulatedDevice device = MakeDevice(id, /*has_second_imu=*/true);
+  SELFCAL_RETURN_IF_ERROR(domain->CreateRig(device.rig).status());
+  const auto segments = Record(device, *MakeHandheld(3, 1, kSeed), "walk");
+  return domain->PutSegment(id, segments.front()).status();
+}
+
 absl::Status Fill(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   SELFCAL_ASSIGN_OR_RETURN(const auto store,
@@ -76,6 +84,7 @@ absl::Status Fill(const std::filesystem::path& folder) {
         domain.CreateRig(HandheldRig(fmt::format("phone-{:03}", i))).status());
   }
   SELFCAL_RETURN_IF_ERROR(domain.CreateRig(MakeDevice("headset").rig).status());
+  SELFCAL_RETURN_IF_ERROR(AddDeviceOfTwoImus(&domain, "pair"));
   return AddDevice(&domain, "tablet");
 }
 

@@ -14,8 +14,10 @@ struct SimulatedDevice {
   Calibration truth;
 };
 
-inline SimulatedDevice MakeDevice(const std::string& id) {
+inline SimulatedDevice MakeDevice(const std::string& id,
+                                  bool has_second_imu = false) {
   SimulatedDevice device{HandheldRig(id), {}};
+  if (has_second_imu) AddSecondImu(&device.rig);
   device.rig.table_size = 4;
   device.truth = device.rig.factory;
   device.rig.factory = PerturbCalibration(device.truth, {}, 1);

@@ -115,12 +115,9 @@ function intervalsOf(
   ] as uPlot.AlignedData;
 }
 
-function Intervals(props: Shown) {
+function Intervals(props: Shown & { of: SegmentResiduals_Intervals }) {
   const [part, setPart] = useState(kWhitened);
-  const [imu, setImu] = useState('0');
-  const { data: segment, residuals } = props;
-  const second = residuals.imu1Intervals;
-  const intervals = imu === '1' && second ? second : residuals.intervals!;
+  const { data: segment, of: intervals } = props;
   const data = useMemo(() => intervalsOf(segment, intervals, part), [segment, intervals, part]);
   const whitened = part === kWhitened;
   const { name, unit } = whitened
@@ -129,17 +126,6 @@ function Intervals(props: Shown) {
   return (
     <>
       <div class="bar">
-        {second && (
-          <Choice
-            label="IMU"
-            value={imu}
-            of={[
-              ['0', 'first'],
-              ['1', 'second'],
-            ]}
-            onChoice={setImu}
-          />
-        )}
         <Choice
           label="IMU residuals between keyframes"
           value={part}
@@ -196,12 +182,14 @@ function InWords(props: { of: SegmentResiduals }) {
   );
 }
 
-export function Residuals(props: Shown & { camera: number }) {
+export function Residuals(props: Shown & { camera: number; imu: number }) {
+  const { intervals, imu1Intervals } = props.residuals;
+  const shown = props.imu === 1 ? imu1Intervals : intervals;
   return (
     <>
       <InWords of={props.residuals} />
       <Reprojections {...props} />
-      {props.residuals.intervals && <Intervals {...props} />}
+      {shown && <Intervals {...props} of={shown} />}
     </>
   );
 }

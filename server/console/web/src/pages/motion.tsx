@@ -170,9 +170,8 @@ function Tracks(props: {
   );
 }
 
-// Vectors of one kind, one per sample, over time in seconds.
-function triple(t: string[], values: number[], factor = 1): uPlot.AlignedData {
-  const start = BigInt(t[0]);
+// Vectors of one kind, one per sample, over time in seconds since `start`.
+function triple(t: string[], values: number[], start: bigint, factor = 1): uPlot.AlignedData {
   const at = (offset: number) => t.map((_, i) => factor * values[3 * i + offset]);
   return [
     t.map((time) => Number(BigInt(time) - start) / 1e9),
@@ -202,7 +201,7 @@ function nearest(times: string[], wanted: bigint): number {
   return best;
 }
 
-// Menus for the version and the camera.
+// Menus for the version, the camera and the IMU.
 function Choices(props: {
   segment: Segment;
   active: string | undefined;
@@ -211,6 +210,9 @@ function Choices(props: {
   cameras: number;
   camera: number;
   onCamera: (camera: number) => void;
+  imus: number;
+  imu: number;
+  onImu: (imu: number) => void;
 }) {
   const scored = props.segment.calibrationVersion;
   return (
@@ -234,30 +236,48 @@ function Choices(props: {
           onChoice={(camera) => props.onCamera(Number(camera))}
         />
       )}
+      {props.imus > 1 && (
+        <Choice
+          label="IMU"
+          value={String(props.imu)}
+          of={[
+            ['0', 'first'],
+            ['1', 'second'],
+          ]}
+          onChoice={(imu) => props.onImu(Number(imu))}
+        />
+      )}
     </div>
   );
 }
 
 function Motion(props: { rig: string; path: string; data: SegmentData; segment: Segment }) {
-  const { imu, keyframes, observations } = props.data;
+  const { imu, imu1, keyframes, observations } = props.data;
   const [at, setAt] = useState(0);
   const [camera, setCamera] = useState(0);
+  const [chosen, setChosen] = useState(0);
   const [version, setVersion] = useState(props.segment.calibrationVersion);
   const rig = useRead<Rig>(rigPath(props.rig));
   const active = useRead<Calibration>(rigPath(props.rig) + '/calibrations/active');
   const residuals = useRead<SegmentResiduals>(
     `${props.path}/residuals?calibration_version=${version}`,
   );
-  const gyro = useMemo(() => triple(imu.tNs, imu.gyro, kDegrees), [imu]);
-  const accel = useMemo(() => triple(imu.tNs, imu.accel), [imu]);
-  const keyframe = nearest(keyframes.tNs, BigInt(imu.tNs[at]));
+  // The readings that are shown; `at` is an index into those of the first IMU.
+  const shown = chosen === 1 && imu1 ? imu1 : imu;
+  const start = BigInt(imu.tNs[0]);
+  const time = BigInt(imu.tNs[at]);
+  const gyro = useMemo(() => triple(shown.tNs, shown.gyro, start, kDegrees), [shown, start]);
+  const accel = useMemo(() => triple(shown.tNs, shown.accel, start), [shown, start]);
+  const cursor = shown === imu ? at : nearest(shown.tNs, time);
+  const toSample = (i: number) => setAt(shown === imu ? i : nearest(imu.tNs, BigInt(shown.tNs[i])));
+  const keyframe = nearest(keyframes.tNs, time);
   const toKeyframe = (k: number) => setAt(nearest(imu.tNs, BigInt(keyframes.tNs[k])));
-  const seconds = gyro[0][at].toFixed(3);
+  const secondsOf = (t: bigint) => Number(t - start) / 1e9;
   const cameras = rig.value?.factory?.cameras;
   return (
     <>
       <label class="scrubber">
-        Time: {seconds} s, keyframe {keyframe + 1} of {keyframes.tNs.length}
+        Time: {secondsOf(time).toFixed(3)} s, keyframe {keyframe + 1} of {keyframes.tNs.length}
         <input
           type="range"
           min={0}
@@ -274,6 +294,9 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
         cameras={cameras?.length ?? 1}
         camera={camera}
         onCamera={setCamera}
+        imus={imu1 ? 2 : 1}
+        imu={chosen}
+        onImu={setChosen}
       />
       <div class="side">
         <Trajectory positions={keyframes.pGi} at={keyframe} />
@@ -293,8 +316,8 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
         series={kAxes}
         x={{ label: 'time [s]' }}
         y="angular rate [°/s]"
-        cursor={at}
-        onCursor={setAt}
+        cursor={cursor}
+        onCursor={toSample}
         height={200}
       />
       <Plot
@@ -303,8 +326,8 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
         series={kAxes}
         x={{ label: 'time [s]' }}
         y="acceleration [m/s²]"
-        cursor={at}
-        onCursor={setAt}
+        cursor={cursor}
+        onCursor={toSample}
         height={200}
       />
       <h2>Residuals</h2>
@@ -316,7 +339,8 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
             keyframe={keyframe}
             onKeyframe={toKeyframe}
             camera={camera}
-            end={gyro[0][imu.tNs.length - 1]}
+            imu={chosen}
+            end={secondsOf(BigInt(imu.tNs[imu.tNs.length - 1]))}
           />
         )}
       </Loaded>
