@@ -157,10 +157,14 @@ def data(daemon: selfcal.Daemon, device: Device, all_kept: bool) -> list:
 
 
 def scores(fleet: RunningFleet, rig_id: str) -> list:
-    """Each segment was offered to each table once."""
+    """Each segment was offered to each table once, since the device changed:
+    of many segments some runs find that, as their copies are shifted.
+    """
     rows = fleet.query(
         "SELECT group_name, scored, capacity,"
-        " (SELECT count(*) FROM segments s WHERE s.rig = t.rig AND state = 2),"
+        " (SELECT count(*) FROM segments s WHERE s.rig = t.rig AND state = 2"
+        "   AND s.sequence >= (SELECT coalesce(max(c.first_sequence), 0)"
+        "     FROM changes c WHERE c.rig = t.rig)),"
         " (SELECT count(*) FROM table_entries e WHERE e.rig = t.rig"
         "   AND e.group_name = t.group_name)"
         " FROM tables t JOIN rigs USING (rig) WHERE id = %s",
