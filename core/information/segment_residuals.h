@@ -34,8 +34,8 @@ struct IntervalResidual {
 struct SegmentResiduals {
   std::vector<ObservationResidual> observations;  // as in the segment
   std::vector<IntervalResidual> intervals;        // of the first IMU
-  // Of the second IMU; empty without one. StartSecondImu starts its velocity
-  // and biases.
+  // Those of the second IMU, with the velocity and biases that StartSecondImu
+  // gives it; empty without one.
   std::vector<IntervalResidual> second_intervals;
   ResidualStatistics statistics;  // as in a score
 };

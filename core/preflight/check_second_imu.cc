@@ -25,17 +25,17 @@ const std::string kPrefix = "second IMU: ";
 // adds errors of its scale and alignment.
 constexpr double kMaxAccelBias_mps2 = 1.5;
 
-// What the checks of an IMU read of a segment.
-MotionSegment Readings(const MotionSegment& segment) {
-  MotionSegment readings;
-  readings.session_start_ns = segment.session_start_ns;
-  readings.keyframes = segment.keyframes;
-  return readings;
+// The keyframes of a segment, without readings and observations.
+MotionSegment KeyframesOf(const MotionSegment& segment) {
+  MotionSegment keyframes;
+  keyframes.session_start_ns = segment.session_start_ns;
+  keyframes.keyframes = segment.keyframes;
+  return keyframes;
 }
 
 // The segment of the second IMU as that of a first one.
 MotionSegment AsFirst(const Calibration& theta, const MotionSegment& segment) {
-  MotionSegment first = Readings(segment);
+  MotionSegment first = KeyframesOf(segment);
   for (KeyframeState& x : first.keyframes) x = StateOfImu(theta, 1, x);
   first.imu = segment.imu1;
   return first;
@@ -59,7 +59,7 @@ std::vector<MotionSegment> StartedSegments(
   const auto shift_ns = static_cast<std::int64_t>(std::llround(offset_s * 1e9));
   std::vector<MotionSegment> started;
   for (const MotionSegment& segment : segments) {
-    MotionSegment usable = Readings(segment);
+    MotionSegment usable = KeyframesOf(segment);
     std::erase_if(usable.keyframes,
                   [](const KeyframeState& x) { return !IsFinite(x); });
     for (KeyframeState& x : usable.keyframes) x.t_ns += shift_ns;

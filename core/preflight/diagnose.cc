@@ -12,8 +12,7 @@
 namespace selfcal {
 namespace {
 
-// Whether the motion can be predicted by the first IMU in spite of what is
-// found.
+// True if the first IMU predicts the motion in spite of what was found.
 bool LeavesMotion(const Diagnosis& diagnosis) {
   return std::all_of(diagnosis.findings.begin(),
                      diagnosis.findings.end(),

@@ -157,8 +157,8 @@ def data(daemon: selfcal.Daemon, device: Device, all_kept: bool) -> list:
 
 
 def scores(fleet: RunningFleet, rig_id: str) -> list:
-    """Each segment was offered to each table once, since the device changed:
-    of many segments some runs find that, as their copies are shifted.
+    """Each segment was offered to each table once, since the last change of
+    the device that a run has found, if there was one: tables then begin again.
     """
     rows = fleet.query(
         "SELECT group_name, scored, capacity,"
