@@ -17,12 +17,12 @@ file(WRITE ${OUTPUT} "#include \"migrations/migrations.h\"
 namespace selfcal::server {
 namespace {
 
-constexpr Migration kMigrations[] = {
+constexpr Migration k${FUNCTION}[] = {
 ${entries}};
 
 }  // namespace
 
-std::span<const Migration> ${FUNCTION}() { return kMigrations; }
+std::span<const Migration> ${FUNCTION}() { return k${FUNCTION}; }
 
 }  // namespace selfcal::server
 ")

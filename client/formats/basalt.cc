@@ -20,8 +20,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kNsPerS = 1e9;
-
 Eigen::Matrix4d ReadPose(const Json& node) {
   const Eigen::Quaterniond q(JsonNumber(node, "qw"),
                              JsonNumber(node, "qx"),

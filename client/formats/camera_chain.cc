@@ -13,7 +13,7 @@ namespace {
 
 // The tool that has the names of all models of a chain; OpenVINS has some of
 // them.
-constexpr char kTool[] = "kalibr";
+constexpr char kKalibr[] = "kalibr";
 
 Eigen::VectorXd ReadList(const YAML::Node& node,
                          const std::string& key,
@@ -26,7 +26,8 @@ Eigen::VectorXd ReadList(const YAML::Node& node,
 FoundModel ReadModel(const std::string& projection,
                      const std::string& distortion) {
   const auto find = [&](std::string_view name) {
-    return FindModel(kTool, projection, name, [](const auto&) { return true; });
+    return FindModel(
+        kKalibr, projection, name, [](const auto&) { return true; });
   };
   auto model = find(distortion);
   // A model without distortion is one whose coefficients are zero.
@@ -37,7 +38,7 @@ FoundModel ReadModel(const std::string& projection,
                   "supported: the models are {}",
                   projection,
                   distortion,
-                  ToolModelNames(kTool)));
+                  ToolModelNames(kKalibr)));
 }
 
 void ReadIntrinsics(const YAML::Node& node, CameraCalibration* camera) {
@@ -98,7 +99,7 @@ CameraCalibration ReadChainCamera(const YAML::Node& node) {
 }
 
 std::string ChainCameraText(const CameraCalibration& camera) {
-  const ToolModel& tool = *FindToolModel(kTool, camera.model);
+  const ToolModel& tool = *FindToolModel(kKalibr, camera.model);
   const DistortionVector& k = camera.distortion;
   std::vector<double> intrinsics(k.begin(), k.begin() + tool.before_pixels);
   intrinsics.insert(intrinsics.end(), camera.f.begin(), camera.f.end());

@@ -14,7 +14,7 @@
 namespace selfcal::client {
 namespace {
 
-constexpr char kTool[] = "camera_info";
+constexpr char kCameraInfo[] = "camera_info";
 constexpr char kEquidistant[] = "equidistant";
 
 // All coefficients of the file, in the order of OpenCV; at least `count`.
@@ -64,10 +64,11 @@ void ReadLens(const YAML::Node& root, CameraCalibration* camera) {
     }
     return true;
   };
-  const auto found = FindModel(kTool, type, {}, is_zero);
+  const auto found = FindModel(kCameraInfo, type, {}, is_zero);
   if (!found) {
-    throw FormatError(fmt::format(
-        "distortion_model '{}' is not one of {}", type, ToolModelNames(kTool)));
+    throw FormatError(fmt::format("distortion_model '{}' is not one of {}",
+                                  type,
+                                  ToolModelNames(kCameraInfo)));
   }
   camera->model = found->model;
   camera->distortion =
@@ -126,7 +127,7 @@ std::string MatrixText(const char* key, const Eigen::MatrixXd& M) {
 
 std::string CameraText(const CameraCalibration& camera,
                        const std::string& name) {
-  const std::string type(FindToolModel(kTool, camera.model)->name);
+  const std::string type(FindToolModel(kCameraInfo, camera.model)->name);
   Eigen::RowVectorXd coefficients = Eigen::RowVectorXd::Zero(CountOf(type));
   coefficients.head(camera.distortion.size()) = camera.distortion.transpose();
   Eigen::Matrix<double, 3, 4> P = Eigen::Matrix<double, 3, 4>::Zero();
@@ -178,10 +179,10 @@ void AddRestOfRig(const Rig& rig,
          "calibration, both in frame I",
          true});
   }
-  AddTimeOffsetLosses(kTool, theta, losses);
-  AddLineDelayLosses(kTool, theta, losses);
-  AddTimeDriftLosses(kTool, theta, losses);
-  AddGravityLoss(kTool, rig, losses);
+  AddTimeOffsetLosses(kCameraInfo, theta, losses);
+  AddLineDelayLosses(kCameraInfo, theta, losses);
+  AddTimeDriftLosses(kCameraInfo, theta, losses);
+  AddGravityLoss(kCameraInfo, rig, losses);
   losses->push_back({"imu_noise",
                      "camera_info has no IMU: `selfcal rig show` has its noise",
                      false});
@@ -218,9 +219,9 @@ ExportedFiles ExportCameraInfo(const Rig& rig,
                                const Calibration& theta,
                                const FormatOptions&) {
   std::vector<CameraCalibration> cameras = theta.cameras;
-  UseModelsOf(kTool, &cameras);
+  UseModelsOf(kCameraInfo, &cameras);
   ExportedFiles result;
-  AddPinholeLosses(kTool, cameras, &result.losses, kEquidistant);
+  AddPinholeLosses(kCameraInfo, cameras, &result.losses, kEquidistant);
   for (std::size_t j = 0; j < cameras.size(); ++j) {
     const std::string name = fmt::format("cam{}", j);
     AddPoseLoss(cameras[j], name, &result.losses);

@@ -17,6 +17,8 @@
 
 namespace selfcal::client {
 
+inline constexpr double kNsPerS = 1e9;
+
 struct TextFile {
   std::string name;  // for error messages; without a folder if it is written
   std::string text;

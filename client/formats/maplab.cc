@@ -16,8 +16,6 @@
 namespace selfcal::client {
 namespace {
 
-constexpr double kNsPerS = 1e9;
-
 ImuNoise ReadNoise(const YAML::Node& imu) {
   const YAML::Node sigmas = Get(imu, "sigmas");
   return {.gyro_noise_density = GetDouble(sigmas, "gyro_noise_density"),

@@ -41,9 +41,9 @@ void LimitScans(j_common_ptr jpeg) {
   }
 }
 
-class Decoder {
+class JpegDecoder {
  public:
-  explicit Decoder(std::string_view bytes) {
+  explicit JpegDecoder(std::string_view bytes) {
     jpeg_.err = jpeg_std_error(&errors_);
     errors_.error_exit = ThrowError;
     errors_.emit_message = ThrowWarning;
@@ -55,9 +55,9 @@ class Decoder {
                  reinterpret_cast<const unsigned char*>(bytes.data()),
                  bytes.size());
   }
-  ~Decoder() { jpeg_destroy_decompress(&jpeg_); }
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
+  ~JpegDecoder() { jpeg_destroy_decompress(&jpeg_); }
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
 
   GreyPixels Decode() {
     jpeg_read_header(&jpeg_, TRUE);
@@ -92,7 +92,7 @@ class Decoder {
 
 absl::StatusOr<GreyPixels> DecodeJpeg(std::string_view bytes) {
   try {
-    return Decoder(bytes).Decode();
+    return JpegDecoder(bytes).Decode();
   } catch (const std::exception& e) {
     return absl::DataLossError(fmt::format("not a whole JPEG: {}", e.what()));
   }

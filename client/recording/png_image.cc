@@ -31,9 +31,9 @@ void ReadBytes(png_structp png, png_bytep target, std::size_t size) {
 constexpr png_byte kColourChunks[] = "gAMA\0sRGB\0cHRM\0iCCP";
 constexpr int kColourChunkCount = 4;
 
-class Decoder {
+class PngDecoder {
  public:
-  explicit Decoder(std::string_view bytes) : rest_(bytes) {
+  explicit PngDecoder(std::string_view bytes) : rest_(bytes) {
     png_ = png_create_read_struct(
         PNG_LIBPNG_VER_STRING, nullptr, ThrowError, IgnoreWarning);
     if (png_ != nullptr) info_ = png_create_info_struct(png_);
@@ -43,9 +43,9 @@ class Decoder {
         png_, PNG_HANDLE_CHUNK_NEVER, kColourChunks, kColourChunkCount);
     png_set_read_fn(png_, &rest_, ReadBytes);
   }
-  ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
+  ~PngDecoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngDecoder(const PngDecoder&) = delete;
+  PngDecoder& operator=(const PngDecoder&) = delete;
 
   GreyPixels Decode() {
     png_read_info(png_, info_);
@@ -90,7 +90,7 @@ class Decoder {
 
 absl::StatusOr<GreyPixels> DecodePng(std::string_view bytes) {
   try {
-    return Decoder(bytes).Decode();
+    return PngDecoder(bytes).Decode();
   } catch (const std::exception& e) {
     return absl::DataLossError(fmt::format("not a whole PNG: {}", e.what()));
   }

@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint32_t kMaxHeaderBytes = 1 << 20;
 constexpr std::uint32_t kMaxConnectionBytes = 16 << 20;
 
-enum Op : unsigned char { kMessage = 2, kChunk = 5, kConnection = 7 };
+enum Op : unsigned char { kOpMessage = 2, kOpChunk = 5, kOpConnection = 7 };
 
 using Fields = std::map<std::string, std::string, std::less<>>;
 
@@ -111,7 +111,7 @@ class Ros1Bag : public MessageFile {
       const auto head = TakeHead(&cursor);
       if (!head.ok()) return;
       const absl::Status read =
-          head->op == kConnection
+          head->op == kOpConnection
               ? AddConnection(head->fields, &cursor, head->size)
               : cursor.Skip(head->size);
       if (!read.ok()) return;
@@ -145,11 +145,11 @@ class Ros1Bag : public MessageFile {
     const auto head = TakeHead(&cursor);
     if (!head.ok()) return head.status();
     switch (head->op) {
-      case kMessage:
+      case kOpMessage:
         return VisitMessage(head->fields, range, head->size, visit);
-      case kConnection:
+      case kOpConnection:
         return AddConnection(head->fields, &cursor, head->size);
-      case kChunk:
+      case kOpChunk:
         if (range->is_chunk) {
           return absl::DataLossError("a chunk is in another one");
         }

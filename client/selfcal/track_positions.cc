@@ -19,7 +19,6 @@ constexpr double kMaxRelativeSigma = 0.25;
 // Largest median of the residuals, in sigmas of a pixel: the states of a SLAM
 // system and its calibration have errors, too.
 constexpr double kMaxMedianSigmas = 10;
-constexpr double kMedianOfRayleigh = 1.1774100225154747;
 
 std::optional<Eigen::Vector3d> TriangulateOne(const LandmarkScene& scene,
                                               const Track& track) {

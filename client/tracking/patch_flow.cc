@@ -8,7 +8,7 @@
 namespace selfcal::client {
 namespace {
 
-constexpr int kIterations = 30;
+constexpr int kMaxFlowSteps = 30;
 constexpr double kEpsilon_px = 0.005;
 // Smallest eigenvalue of the gradients of a patch, for each of its pixels: less
 // is noise.
@@ -23,7 +23,7 @@ void Flow(const Pyramid& from,
   std::vector<float> error;
   const cv::TermCriteria criteria(
       cv::TermCriteria::COUNT + cv::TermCriteria::EPS,
-      kIterations,
+      kMaxFlowSteps,
       kEpsilon_px);
   cv::calcOpticalFlowPyrLK(from,
                            to,

@@ -7,14 +7,14 @@
 namespace selfcal::client {
 namespace {
 
-constexpr int kIterations = 12;
+constexpr int kMaxTemplateSteps = 12;
 constexpr double kConverged_px = 0.003;
 constexpr double kMaxMove_px = 3;
 constexpr double kWeightSigma_px = 5;
 // Damping of a step of A, relative to the information of a patch of strong
 // gradients: parts of A that the patch does not show stay as predicted.
 constexpr double kDamping = 2e-3;
-constexpr double kMaxStretch = 3;
+constexpr double kMaxWarpNorm = 3;
 
 // Grey at a place inside the image, interpolated.
 float GreyAt(const cv::Mat& image, float x, float y) {
@@ -105,7 +105,7 @@ double PatchTemplate::Align(const cv::Mat& image,
   double gain = 1;
   double offset = 0;
   bool converged = false;
-  for (int k = 0; k < kIterations && !converged; ++k) {
+  for (int k = 0; k < kMaxTemplateSteps && !converged; ++k) {
     if (!sample(w, &sampled)) return 0;
     const Values residuals = sampled - static_cast<float>(gain) * greys_ -
                              Values::Constant(static_cast<float>(offset));
@@ -123,7 +123,7 @@ double PatchTemplate::Align(const cv::Mat& image,
     const Eigen::Vector2d moved = -(w.A * step.segment<2>(4)) / gain;
     w.z_px += moved;
     if (!((w.z_px - warp->z_px).norm() < kMaxMove_px) ||
-        !(w.A.norm() < kMaxStretch)) {
+        !(w.A.norm() < kMaxWarpNorm)) {
       return 0;
     }
     converged = moved.norm() < kConverged_px;

@@ -9,7 +9,7 @@ namespace selfcal {
 namespace {
 
 // Limits the number of rounds; usually they converge after two to four.
-constexpr int kMaxRounds = 12;
+constexpr int kMaxDescentRounds = 12;
 // The first round only has to come near enough to detect outliers.
 constexpr double kFirstTolerance = 1e-4;
 constexpr double kTolerance = 1e-8;
@@ -122,7 +122,7 @@ bool Descent::IsSettled() {
 }
 
 bool Descent::DescendByRounds() {
-  for (int round = 0; round < kMaxRounds; ++round) {
+  for (int round = 0; round < kMaxDescentRounds; ++round) {
     const Eigen::VectorXd d_before = point_->estimate().d;
     const SolverOutcome outcome = SolveOneRound(round);
     if (outcome.status == SolverStatus::kCancelled) return Cancel();

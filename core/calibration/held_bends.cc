@@ -11,10 +11,10 @@
 namespace selfcal {
 namespace {
 
-constexpr int kMaxIterations = 10;
+constexpr int kMaxBendIterations = 10;
 // A minimum is accurate enough when an iteration reduces the cost by less [half
 // squares].
-constexpr double kEnough = 0.01;
+constexpr double kEnoughBend = 0.01;
 
 // Moves the estimated directions along with the held ones.
 class Bends {
@@ -77,9 +77,9 @@ class Bends {
     std::vector<ScreenedLandmark> landmarks = point_.screening().landmarks;
     ApplyStep(linearised_, step_d, &estimate, &landmarks);
     SolverRound round = round_;
-    round.max_iterations = kMaxIterations;
-    const SolverOutcome outcome =
-        SolveRoundByStructure(round, EndBelow(kEnough), &estimate, &landmarks);
+    round.max_iterations = kMaxBendIterations;
+    const SolverOutcome outcome = SolveRoundByStructure(
+        round, EndBelow(kEnoughBend), &estimate, &landmarks);
     if (outcome.status != SolverStatus::kConverged) return std::nullopt;
     return estimate.d;
   }

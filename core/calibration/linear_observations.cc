@@ -6,11 +6,11 @@ namespace selfcal {
 namespace {
 
 // The modelled distance of a landmark is at most 1 / this [m].
-constexpr double kLeastInverseDepth = 1e-9;
+constexpr double kLeastAbsInverseDepth = 1e-9;
 
 double UsedInverseDepth(const LandmarkPosition& position) {
   const double rho = position.inverse_depth.z();
-  return std::abs(rho) < kLeastInverseDepth ? kLeastInverseDepth : rho;
+  return std::abs(rho) < kLeastAbsInverseDepth ? kLeastAbsInverseDepth : rho;
 }
 
 }  // namespace

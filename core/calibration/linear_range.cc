@@ -6,9 +6,9 @@
 namespace selfcal {
 namespace {
 
-constexpr int kMaxIterations = 10;
+constexpr int kMaxRangeIterations = 10;
 // The minimum is accurate enough when an iteration reduces the cost by less.
-constexpr double kEnough = 0.1 * kGrowthTolerance;
+constexpr double kEnoughRange = 0.1 * kGrowthTolerance;
 
 }  // namespace
 
@@ -18,11 +18,11 @@ LinearRange::LinearRange(const SolverRound& round,
     : round_(round), estimate_(estimate), landmarks_(landmarks) {
   double last = 0;
   SolverRound settling = round_;
-  settling.max_iterations = kMaxIterations;
+  settling.max_iterations = kMaxRangeIterations;
   const SolverOutcome outcome = SolveRoundByStructure(
       settling,
       [&](int iteration, double cost, const Eigen::VectorXd&) {
-        const bool enough = iteration > 0 && last - cost < kEnough;
+        const bool enough = iteration > 0 && last - cost < kEnoughRange;
         last = cost;
         return enough ? SolverSignal::kEnough : SolverSignal::kGoOn;
       },
@@ -55,14 +55,14 @@ bool LinearRange::GrowsAsClaimed(const Eigen::VectorXd& sigma_step,
   ApplyStep(linearised_, length * sigma_step, &estimate, &landmarks);
   double last = 0;
   SolverRound walk = round_;
-  walk.max_iterations = kMaxIterations;
+  walk.max_iterations = kMaxRangeIterations;
   // If the point on the tangent already costs no more than claimed, the
   // linearisation holds up to that point.
   const SolverOutcome outcome = SolveRoundByStructure(
       walk,
       [&](int iteration, double cost, const Eigen::VectorXd&) {
-        const bool enough =
-            iteration == 0 ? cost < claimed + tolerance : last - cost < kEnough;
+        const bool enough = iteration == 0 ? cost < claimed + tolerance
+                                           : last - cost < kEnoughRange;
         last = cost;
         return enough ? SolverSignal::kEnough : SolverSignal::kGoOn;
       },

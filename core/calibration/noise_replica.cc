@@ -56,14 +56,6 @@ MotionSegment WithNoise(const MotionSegment& segment,
   return noisy;
 }
 
-// Information on the subspace, in units of the prior.
-Eigen::MatrixXd Reduced(const Rig& rig,
-                        const ThetaSubspace& subspace,
-                        const Eigen::MatrixXd& Lambda) {
-  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
-  return basis.transpose() * Lambda * basis;
-}
-
 }  // namespace
 
 Eigen::MatrixXd FindSpurious(const Rig& rig,

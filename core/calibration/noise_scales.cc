@@ -8,7 +8,9 @@
 
 #include "core/calibration/noise_balance.h"
 #include "core/calibration/track_noise.h"
+#include "core/model/median.h"
 #include "core/model/second_imu.h"
+#include "core/model/square.h"
 
 namespace selfcal {
 namespace {
@@ -16,9 +18,6 @@ namespace {
 template <int kinds>
 using NoiseMatrix = Eigen::Matrix<double, kinds, kinds>;
 
-constexpr double Square(double x) { return x * x; }
-
-constexpr double kMedianOfRayleigh = 1.1774100225154747;
 // Prior sigma of the logarithm of a noise scale.
 const double kPriorLogSigma = std::log(10.0);
 // Errors in the stated noise of an IMU are correlated: given one of its noise

@@ -7,6 +7,7 @@
 #include "core/calibration/screening.h"
 #include "core/calibration/subspace.h"
 #include "core/calibration/track_noise.h"
+#include "core/model/square.h"
 
 namespace selfcal {
 namespace {
@@ -19,8 +20,6 @@ constexpr int kMaxReweightings = 4;
 // residuals would be beyond the begin of the loss as soon as they show any of
 // the errors that the least noise of the weights stands for.
 constexpr double kLeastResiduals = 0.3;
-
-constexpr double Square(double x) { return x * x; }
 
 }  // namespace
 

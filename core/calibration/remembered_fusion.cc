@@ -16,12 +16,12 @@ namespace {
 // comparable with the others.
 constexpr double kMaxFit = 2;
 // Probability that any segment is excluded wrongly.
-constexpr double kChance = 1e-3;
+constexpr double kWrongExclusion = 1e-3;
 // A difference that is more probable than this is treated as chance.
 constexpr double kLikely = 0.05;
 
 // Information about d, along the determined directions.
-struct Reduced {
+struct ReducedInformation {
   Eigen::MatrixXd Lambda;  // r x r
   Eigen::VectorXd eta;     // r
 };
@@ -114,13 +114,13 @@ class Fusion {
   }
 
   // Projects the information on the determined directions.
-  Reduced ReducedOf(const ThetaInformation& information) const {
+  ReducedInformation ReducedOf(const ThetaInformation& information) const {
     const Eigen::MatrixXd step = by_offset_ * basis_;
     return {step.transpose() * information.Lambda * step,
             step.transpose() * information.eta};
   }
 
-  AgreementTest TestWithData(const Reduced& one) const {
+  AgreementTest TestWithData(const ReducedInformation& one) const {
     return TestAgreement(one.Lambda,
                          one.eta,
                          with_data_,
@@ -130,7 +130,7 @@ class Fusion {
 
   // Tests each of them separately.
   int ExcludeContradictions() {
-    const double limit = kChance / static_cast<double>(Count());
+    const double limit = kWrongExclusion / static_cast<double>(Count());
     return static_cast<int>(
         std::erase_if(joined_, [&](const JoinedSegment& one) {
           if (one.calibrated_on) return false;
@@ -151,7 +151,7 @@ class Fusion {
       return;
     }
     use.agreement = TestWithData(ReducedOf(found.information));
-    if (use.agreement.probability < kChance) {
+    if (use.agreement.probability < kWrongExclusion) {
       use.unused = "together they contradict the segments whose data is kept";
       return;
     }

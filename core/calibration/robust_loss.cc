@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/square.h"
+
 namespace selfcal {
 namespace {
 
 // Fraction of the gate at which the weight begins to decrease.
 constexpr double kTaperBegin = 0.6;
-
-double Square(double x) { return x * x; }
 
 double PlainWeight(LossKind kind, double scale, double s) {
   switch (kind) {

@@ -14,8 +14,6 @@
 namespace selfcal {
 namespace {
 
-constexpr double kMedianOfRayleigh = 1.1774100225154747;
-
 // Observations of a track within the gate of its position, and away from the
 // border of the image.
 struct Selected {

@@ -14,7 +14,7 @@ namespace selfcal {
 namespace {
 
 // False-alarm probability, over all segments of a calibration.
-constexpr double kChance = 1e-5;
+constexpr double kFalseAlarm = 1e-5;
 // Residuals larger than those of the other segments by this factor are not
 // comparable.
 constexpr double kMaxRatio = 3;
@@ -170,7 +170,8 @@ std::vector<Contradiction> FindContradictions(
         per_degree.begin());
     const AgreementTest& test = tests[worst];
     if (test.degrees == 0 ||
-        ChiSquareTail(test.statistic / scale, test.degrees) >= kChance / size) {
+        ChiSquareTail(test.statistic / scale, test.degrees) >=
+            kFalseAlarm / size) {
       break;
     }
     char text[160];

@@ -19,11 +19,11 @@ namespace selfcal {
 namespace {
 
 // Limit of the rounds, each with a new selection of observations.
-constexpr int kMaxRounds = 3;
-constexpr int kMaxIterations = 10;
+constexpr int kMaxSelections = 3;
+constexpr int kMaxEndIterations = 10;
 // A minimum is accurate enough when an iteration reduces the cost by less [half
 // squares]; the selection is final when a round does.
-constexpr double kEnough = 0.1;
+constexpr double kEnoughCost = 0.1;
 
 // States of a SLAM system are good if their velocities are this near to those
 // of the minimum [m/s, and a fraction of the velocity]: those of filters, also
@@ -40,7 +40,7 @@ std::optional<SolverOutcome> Settle(const SolverRound& round,
                                     CalibrationEstimate* estimate,
                                     std::vector<ScreenedLandmark>* landmarks) {
   const SolverOutcome outcome =
-      SolveRoundByStructure(round, EndBelow(kEnough), estimate, landmarks);
+      SolveRoundByStructure(round, EndBelow(kEnoughCost), estimate, landmarks);
   if (outcome.status == SolverStatus::kFailed) return std::nullopt;
   return outcome;
 }
@@ -92,7 +92,7 @@ MotionSegment SettleSegment(const Rig& rig,
   CalibrationEstimate estimate{Eigen::VectorXd::Zero(size), problem.keyframes};
   KeyframeMotions motions;
   Screening screening;
-  for (int i = 0; i < kMaxRounds; ++i) {
+  for (int i = 0; i < kMaxSelections; ++i) {
     MeasureMotions(rig, theta, problem, estimate.keyframes, &motions);
     screening = ScreenLandmarks(rig,
                                 theta,
@@ -112,10 +112,10 @@ MotionSegment SettleSegment(const Rig& rig,
                                .whitening = whitening,
                                .basis = held,
                                .loss = screening.loss,
-                               .max_iterations = kMaxIterations};
+                               .max_iterations = kMaxEndIterations};
     const auto outcome = Settle(round, &estimate, &screening.landmarks);
     if (!outcome) return segment;
-    if (outcome->initial_cost - outcome->final_cost < kEnough) break;
+    if (outcome->initial_cost - outcome->final_cost < kEnoughCost) break;
   }
   return At(segment, problem, estimate, screening.landmarks);
 }

@@ -32,14 +32,6 @@ std::vector<std::string> FreeNames(const Rig& rig) {
   return names;
 }
 
-// Lambda on the estimated subspace, r x r, in units of the prior.
-Eigen::MatrixXd Reduced(const Rig& rig,
-                        const ThetaSubspace& subspace,
-                        const Eigen::MatrixXd& Lambda) {
-  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
-  return basis.transpose() * Lambda * basis;
-}
-
 // Eigenvalues in ascending order; empty for an empty matrix.
 struct Spectrum {
   Eigen::VectorXd values;
@@ -138,6 +130,13 @@ ThetaSubspace HoldDirections(const Rig& rig,
 
 Eigen::MatrixXd TangentBasis(const Rig& rig, const ThetaSubspace& subspace) {
   return FreeSigmas(rig).asDiagonal() * subspace.estimated;
+}
+
+Eigen::MatrixXd Reduced(const Rig& rig,
+                        const ThetaSubspace& subspace,
+                        const Eigen::MatrixXd& Lambda) {
+  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
+  return basis.transpose() * Lambda * basis;
 }
 
 Eigen::VectorXd ProjectOnSubspace(const Rig& rig,

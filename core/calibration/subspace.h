@@ -51,6 +51,11 @@ ThetaSubspace HoldDirections(const Rig& rig,
 // SubspaceManifold.
 Eigen::MatrixXd TangentBasis(const Rig& rig, const ThetaSubspace& subspace);
 
+// Lambda on the estimated subspace, r x r, in units of the prior.
+Eigen::MatrixXd Reduced(const Rig& rig,
+                        const ThetaSubspace& subspace,
+                        const Eigen::MatrixXd& Lambda);
+
 // Projects a step of theta (tangent units) on the estimated subspace;
 // orthogonal in units of the prior.
 Eigen::VectorXd ProjectOnSubspace(const Rig& rig,

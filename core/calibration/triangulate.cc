@@ -21,7 +21,6 @@ constexpr double kMinInverseDepth = 1e-4;
 // If half of the observations are this close to a position, further pairs are
 // not tried; only refinement improves it.
 constexpr double kEnoughSigmas = 2.0;
-constexpr double kMedianOfRayleigh = 1.1774100225154747;
 
 struct Ray {
   Eigen::Vector3d center_G;

@@ -10,10 +10,6 @@
 namespace selfcal {
 namespace {
 
-// A direction is observed, as everywhere, if the data has more information than
-// the prior.
-constexpr double kObserved = 1.0;
-
 // Ratio of the standard deviation of the unknown error of a segment to its
 // reach. Errors of simulated rotations in place are up to one and a half times
 // the reach.

@@ -34,6 +34,9 @@
 namespace selfcal {
 
 inline constexpr double kMaxLinearisation = 1.0;  // reference sigmas
+// A direction is observed, as everywhere, if the data has more information than
+// the prior.
+inline constexpr double kObserved = 1.0;
 
 // A calibration with its uncertainty.
 struct KnownCalibration {

@@ -14,10 +14,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// A direction is observed, as everywhere, if the data has more information than
-// the prior.
-constexpr double kObserved = 1.0;
-
 // Computes (Sigma^-1 + L0)^-1 without the inverse of either.
 MatrixXd ErrorCovariance(const MatrixXd& L0, const MatrixXd& root) {
   MatrixXd A = root.transpose() * L0 * root;

@@ -7,14 +7,6 @@
 #include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
-namespace {
-
-// A direction is observed, as everywhere, if the data has more information than
-// the prior.
-constexpr double kObserved = 1.0;
-
-}  // namespace
-
 Heterogeneity::Heterogeneity(std::span<const OffsetInformation> segments) {
   for (const OffsetInformation& segment : segments) {
     const SymmetricEigen eigen(segment.Lambda);

@@ -20,7 +20,7 @@ using namespace chain;
 
 namespace {
 
-using RowMajorPanel = Eigen::Map<
+using ConstPanelMap = Eigen::Map<
     const Eigen::
         Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>,
     0,
@@ -128,7 +128,7 @@ class CovarianceWalk {
   ChainNoiseVector Noise(const ChainRecord::Step& step,
                          const Eigen::VectorXd& z,
                          const ChainStateVector& next) const {
-    const RowMajorPanel P(record_.Product(step),
+    const ConstPanelMap P(record_.Product(step),
                           kState,
                           step.stride,
                           Eigen::OuterStride<>(step.stride));
@@ -136,7 +136,7 @@ class CovarianceWalk {
     noise.head<kState>() = -Factor(step).solve(P * z.head(step.stride));
     if (step.rows > 0) {
       const ChainTransition link = record_.Link(step);
-      const RowMajorPanel H = Rows(link);
+      const ConstPanelMap H = Rows(link);
       const TransitionColumns& at = link.columns;
       noise.tail(step.rows) =
           H.leftCols(at.constant) * z.head(at.constant) + H.col(at.constant) +
@@ -172,7 +172,7 @@ class CovarianceWalk {
         .template leftCols<kState>()
         .template triangularView<Eigen::Upper>();
   }
-  static RowMajorPanel Rows(const ChainTransition& link) {
+  static ConstPanelMap Rows(const ChainTransition& link) {
     return {link.H,
             link.rows,
             link.columns.stride,
@@ -187,7 +187,7 @@ class CovarianceWalk {
     const TransitionColumns& at = link.columns;
     const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> front(
         covariance_.data(), size_, size_, Eigen::OuterStride<>(stride_));
-    const RowMajorPanel product(
+    const ConstPanelMap product(
         product_.data(), kState, size_, Eigen::OuterStride<>(stride_));
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(step.rows, size_);
     H.leftCols(at.constant) = Rows(link).leftCols(at.constant);
@@ -278,9 +278,9 @@ class CovarianceWalk {
 
   // The product of rows over the front with the transpose of P.
   StateMatrix ByPanel(const std::vector<double>& rows) const {
-    return RowMajorPanel(
+    return ConstPanelMap(
                rows.data(), kState, size_, Eigen::OuterStride<>(stride_)) *
-           RowMajorPanel(
+           ConstPanelMap(
                panel_.data(), size_, kState, Eigen::OuterStride<>(kTileState));
   }
 
@@ -292,9 +292,9 @@ class CovarianceWalk {
     if (step.linked) {
       const ChainTransition link = record_.Link(step);
       const TransitionColumns& at = link.columns;
-      const RowMajorPanel G(
+      const ConstPanelMap G(
           link.G, kState, at.stride, Eigen::OuterStride<>(at.stride));
-      const RowMajorPanel with_front(
+      const ConstPanelMap with_front(
           with_front_.data(), kState, size_, Eigen::OuterStride<>(stride_));
       state_ += with_front.leftCols(at.constant) *
                     G.leftCols(at.constant).transpose() +

@@ -13,7 +13,7 @@ template <int cols>
 using RowMajor15 = Eigen::Matrix<double, 15, cols, Eigen::RowMajor>;
 
 // The blocks of a state are consecutive: q, p, vb.
-enum Block { kTheta, kState0, kState1 = kState0 + 3 };
+enum StateBlock { kMotionTheta, kState0, kState1 = kState0 + 3 };
 
 // A keyframe, with the motion of one IMU.
 KeyframeState ReadState(std::int64_t t_ns,
@@ -77,7 +77,7 @@ class InertialCost final : public ceres::CostFunction {
                 double** jacobians) const override {
     const KeyframeState x0 = ReadState(t0_ns_, imu_, parameters + kState0);
     const KeyframeState x1 = ReadState(t1_ns_, imu_, parameters + kState1);
-    const Calibration theta = OffsetImus(reference_, parameters[kTheta]);
+    const Calibration theta = OffsetImus(reference_, parameters[kMotionTheta]);
     InertialJacobians J;
     Map<InertialResidual> r(residuals);
     const InertialResidual residual =
@@ -91,7 +91,7 @@ class InertialCost final : public ceres::CostFunction {
                          nullptr);
     r = W_ * residual;
     if (jacobians == nullptr) return true;
-    const double* d = parameters[kTheta];
+    const double* d = parameters[kMotionTheta];
     Eigen::MatrixXd by_imus =
         Eigen::MatrixXd::Zero(15, LinkTangentSize(reference_));
     const int first = imu_ == 0 ? 0 : ImuTangentSize(reference_.imu);
@@ -106,7 +106,7 @@ class InertialCost final : public ceres::CostFunction {
                                                *theta.imu1,
                                                residual);
     }
-    if (double* out = jacobians[kTheta]) {
+    if (double* out = jacobians[kMotionTheta]) {
       Map<RowMajor15<Eigen::Dynamic>> by_theta(out, 15, theta_size_);
       by_theta.setZero();
       by_theta.leftCols(by_imus.cols()) = W_ * by_imus;

@@ -7,7 +7,7 @@
 namespace selfcal {
 namespace {
 
-using RowMajor =
+using RowMajorMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 class TemperatureCost final : public ceres::CostFunction {
@@ -38,7 +38,7 @@ class TemperatureCost final : public ceres::CostFunction {
     if (jacobians == nullptr || jacobians[0] == nullptr) {
       return cost_->Evaluate(parameters_s.data(), residuals, jacobians);
     }
-    RowMajor by_theta_s(num_residuals(), d_s.size());
+    RowMajorMatrix by_theta_s(num_residuals(), d_s.size());
     std::vector<double*> jacobians_s(jacobians, jacobians + blocks);
     jacobians_s[0] = by_theta_s.data();
     if (!cost_->Evaluate(parameters_s.data(), residuals, jacobians_s.data())) {
@@ -48,7 +48,7 @@ class TemperatureCost final : public ceres::CostFunction {
         ThetaByOffset(reference_s_, d_s).inverse() *
         TemperatureDerivative(theta, temperature_c_) *
         ThetaByOffset(reference_, d);
-    Eigen::Map<RowMajor>(jacobians[0], num_residuals(), d.size()) =
+    Eigen::Map<RowMajorMatrix>(jacobians[0], num_residuals(), d.size()) =
         by_theta_s * theta_s_by_offset;
     return true;
   }

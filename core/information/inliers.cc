@@ -6,17 +6,16 @@
 #include <limits>
 
 #include "core/elimination/small_cholesky.h"
+#include "core/model/median.h"
 #include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
 
-// Median of the norm of a two-dimensional normal vector of unit sigma.
-constexpr double kMedianOfRayleigh = 1.1774100225154747;
 constexpr double kManyOutliers = 0.2;
 // The first step does nearly everything: with a calibration as inaccurate as a
 // factory calibration, it reduces the median residual from 8 px to 2 px.
-constexpr int kMaxSteps = 2;
+constexpr int kMaxRobustSteps = 2;
 constexpr double kHuberSigmas = 2.0;
 // Relative to the distance from the first keyframe that sees the landmark.
 constexpr double kDistancePrior = 0.5;
@@ -213,7 +212,7 @@ const InlierSelection& InlierSelector::Select(const Calibration& theta0,
   for (std::size_t m = 0; m < moving_.size(); ++m) {
     moving_[m] = order.Track(static_cast<int>(m)).size() >= 2;
   }
-  for (int i = 0; i < kMaxSteps && ProposeSteps(segment); ++i) {
+  for (int i = 0; i < kMaxRobustSteps && ProposeSteps(segment); ++i) {
     Evaluate(theta0, pixel_sigma_px, segment, motions, order);
     TakeSteps(order);
   }

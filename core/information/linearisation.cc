@@ -11,8 +11,6 @@
 namespace selfcal {
 namespace {
 
-constexpr int kKinds = kStateTangentSize / 3;
-
 // The gauge is also a prior: the rest of the problem does not depend on it, so
 // any proper prior is equivalent to removing its four directions. This sigma
 // keeps the numbers near those of the inertial factors.
@@ -137,7 +135,7 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
   }
   inertial_.Linearise(links_, theta0, rig, &transitions_);
   const std::size_t links = transitions_.size();
-  double squares[kKinds] = {};
+  double squares[kStateKinds] = {};
   for (std::size_t i = 0; i < links; ++i) {
     for (int j = 0; j < kStateTangentSize; ++j) {
       const double r = transitions_.Whitened(i, 0)[j];

@@ -13,8 +13,6 @@
 namespace selfcal {
 namespace {
 
-constexpr int kKinds = kStateTangentSize / 3;
-
 std::vector<ObservationResidual> Reprojections(
     const Calibration& theta,
     const MotionSegment& segment,
@@ -67,7 +65,7 @@ std::vector<IntervalResidual> Intervals(const Rig& rig,
 
 std::vector<double> InertialRms(
     const std::vector<IntervalResidual>& intervals) {
-  std::vector<double> rms(kKinds, 0);
+  std::vector<double> rms(kStateKinds, 0);
   for (const IntervalResidual& interval : intervals) {
     for (int j = 0; j < kStateTangentSize; ++j) {
       rms[j / 3] += interval.whitened[j] * interval.whitened[j];

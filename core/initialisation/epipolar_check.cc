@@ -15,11 +15,10 @@ namespace {
 
 // Steps at each scale of the residuals, and the ratio of two scales.
 constexpr int kSteps = 3;
-constexpr double kNextScale = 0.6;
+constexpr double kNextEpipolarScale = 0.6;
 // Sigma of the direction from which a refinement begins: distant points do not
 // determine it.
 constexpr double kDirectionSigma_rad = 0.3;
-constexpr double kMadToSigma = 1.4826;
 constexpr double kSigmas = 3.5;
 // A point that has moved against its parallax by more than this is behind a
 // camera.
@@ -76,7 +75,8 @@ class Fitter {
   // 2020).
   void Refine(double from_px, double to_px) {
     given_t_ = t_;
-    for (double scale_px = from_px; scale_px > to_px; scale_px *= kNextScale) {
+    for (double scale_px = from_px; scale_px > to_px;
+         scale_px *= kNextEpipolarScale) {
       for (int k = 0; k < kSteps; ++k) Step(scale_px);
     }
     for (int k = 0; k < kSteps; ++k) Step(to_px);

@@ -26,12 +26,11 @@ constexpr double kLastStep = 0.02;
 // of the first steps; later ones only follow.
 constexpr int kSearches = 4;
 constexpr double kFirstScale_px = 8;
-constexpr double kNextScale = 0.7;
+constexpr double kNextRefinementScale = 0.7;
 constexpr double kLeastScale_px = 0.05;
-constexpr double kMadToSigma = 1.4826;
-constexpr double kSigmas = 2.5;  // of the final scale
+constexpr double kInlierSigmas = 2.5;  // of the final scale
 // A step of a direction, as if there was a prior at where it is.
-constexpr double kDirectionSigma_rad = 0.3;
+constexpr double kDirectionStep_rad = 0.3;
 
 // Largest step of each component.
 const Vector8 kMaxStep = {0.2, 0.2, 0.2, 0.02, 0.1, 0.1, 0.1, 0.2};
@@ -59,7 +58,7 @@ class Refiner {
       Predict();
       if (n < kSearches) SearchDirections(n);
       const double least_px = LeastScale();
-      scale_px = std::max(scale_px * kNextScale, least_px);
+      scale_px = std::max(scale_px * kNextRefinementScale, least_px);
       if (Step(scale_px) < kLastStep && scale_px == least_px && n > kSearches) {
         break;
       }
@@ -187,7 +186,7 @@ class Refiner {
   }
 
   double LeastScale() const {
-    return std::max(kLeastScale_px, kSigmas * RobustSigma());
+    return std::max(kLeastScale_px, kInlierSigmas * RobustSigma());
   }
 
   // Uses Geman-McClure weights; or, for a covariance, with the second
@@ -222,7 +221,7 @@ class Refiner {
       H_loss += weight * (1 - 3 * square) / (1 + square) * J * J.transpose();
     }
     H.bottomRightCorner<2, 2>().diagonal().array() +=
-        std::pow(scale_px / kDirectionSigma_rad, 2);
+        std::pow(scale_px / kDirectionStep_rad, 2);
     const Eigen::Matrix2d inverse = H.bottomRightCorner<2, 2>().inverse();
     Equations equations;
     equations.d = inverse * g.tail<2>();
@@ -247,7 +246,7 @@ class Refiner {
   // Returns the length of the step in sigmas.
   double Step(double scale_px) {
     // Treated as if all residuals below the scale were noise.
-    const double variance = std::pow(scale_px / kSigmas, 2);
+    const double variance = std::pow(scale_px / kInlierSigmas, 2);
     const Vector8 prior = variance * PriorInformation();
     Matrix8 H = prior.asDiagonal();
     Vector8 g = prior.cwiseProduct(BoxMinus(at_, prior_.mean));
@@ -275,7 +274,7 @@ class Refiner {
   // noise does not have, such as those of a track; neighbours, which share an
   // image, are treated as independent.
   Matrix8 Covariance(double scale_px) const {
-    const double variance = std::pow(scale_px / kSigmas, 2);
+    const double variance = std::pow(scale_px / kInlierSigmas, 2);
     const Vector8 prior = variance * PriorInformation();
     Matrix8 H = Matrix8::Zero();
     Matrix8 scatter = Matrix8::Zero();

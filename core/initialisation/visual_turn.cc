@@ -14,7 +14,7 @@ namespace {
 // after a small translation.
 constexpr double kFirstScale_rad = 0.2;
 constexpr double kLeastScale_rad = 0.003;
-constexpr double kNextScale = 0.6;
+constexpr double kNextTurnScale = 0.6;
 // Error of the rotation of distant points: it follows the mean parallax.
 constexpr double kRotationSigma_rad = 0.1;
 constexpr double kFlowShare = 0.1;
@@ -35,7 +35,7 @@ Eigen::Quaterniond RotationOfDistantPoints(const std::vector<RayPair>& pairs) {
   Eigen::Quaterniond q_BA = Eigen::Quaterniond::Identity();
   std::vector<double> errors(pairs.size());
   for (double scale = kFirstScale_rad; scale > kLeastScale_rad;
-       scale *= kNextScale) {
+       scale *= kNextTurnScale) {
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       errors[i] = (pairs[i].b - q_BA * pairs[i].a).norm();
     }

@@ -6,6 +6,12 @@
 
 namespace selfcal {
 
+// Median of the norm of a two-dimensional normal vector of unit sigma.
+inline constexpr double kMedianOfRayleigh = 1.1774100225154747;
+// Standard deviation over median distance to the median, of a normal
+// distribution.
+inline constexpr double kMadToSigma = 1.4826;
+
 // The median of at least one value, and of an even number the larger of the two
 // in the middle. Reorders the values.
 template <typename T>

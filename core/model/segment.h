@@ -32,6 +32,8 @@ struct KeyframeState {
 };
 
 inline constexpr int kStateTangentSize = 15;
+// Kinds of three components each, in this order.
+inline constexpr int kStateKinds = kStateTangentSize / 3;
 inline constexpr int kStateRotation = 0;
 inline constexpr int kStatePosition = 3;
 inline constexpr int kStateVelocity = 6;

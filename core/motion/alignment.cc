@@ -37,7 +37,6 @@ constexpr double kAccelBiasAfter_mps2 = 0.03;
 constexpr double kGravityLength_mps2 = 0.01;
 // Residuals beyond this many robust standard deviations have little weight.
 constexpr double kCauchySigmas = 2;
-constexpr double kMedianOfRayleigh = 1.1774100225154747;
 // Information about a landmark along its rays, relative to that across.
 constexpr double kNoParallax = 1e-9;
 // Part of the observations that have to agree.

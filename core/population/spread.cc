@@ -24,9 +24,7 @@ constexpr double kSmallestSigma = 1e-4;
 // A device determines a component if its data has more information than the
 // scale.
 constexpr double kDetermined = 0.5;
-// Standard deviation over median deviation of the normal distribution, and the
-// efficiency of the latter.
-constexpr double kSigmaByDeviation = 1.4826;
+// Efficiency of the median deviation from the median, of a normal distribution.
 constexpr double kEfficiency = 0.37;
 constexpr double kSmallSample = 4;
 
@@ -149,7 +147,7 @@ Spread RobustSpread(std::span<const ThetaInformation> devices,
     const auto count = static_cast<double>(values.size());
     spread.mu(j) = UpperMedian(values);
     for (double& value : values) value = std::abs(value - spread.mu(j));
-    const double sigma = kSigmaByDeviation * UpperMedian(values);
+    const double sigma = kMadToSigma * UpperMedian(values);
     const double of_noise = UpperMedian(noise);
     // The median deviation of few devices is often too small.
     const double variance = (1 + kSmallSample / count) *

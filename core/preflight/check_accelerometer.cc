@@ -17,24 +17,24 @@ namespace {
 
 constexpr int kMinIntervals = 10;
 // Errors as fractions of gravity: the error of an explanation is less than
-// kExplained and at most a third of the error without it, which has to exceed
-// kNoticed; an error above kUnexplained is reported even without an
+// kExplainedForce and at most a third of the error without it, which has to
+// exceed kNoticed; an error above kUnexplainedForce is reported even without an
 // explanation.
-constexpr double kExplained = 0.15;
+constexpr double kExplainedForce = 0.15;
 constexpr double kNoticed = 0.1;
-constexpr double kUnexplained = 0.3;
-constexpr double kGain = 3;
+constexpr double kUnexplainedForce = 0.3;
+constexpr double kForceGain = 3;
 // Range of the norm of correct readings, as a fraction of gravity: also in
 // vigorous motion, and with gravity removed.
 constexpr double kRightLow = 0.6;
 constexpr double kRightHigh = 1.7;
 
-struct Unit {
+struct ForceUnit {
   double to_mps2;
   const char* name;
 };
 constexpr double kStandardGravity = 9.80665;
-constexpr std::array<Unit, 3> kUnits = {
+constexpr std::array<ForceUnit, 3> kForceUnits = {
     {{kStandardGravity, "g"},
      {1e-3 * kStandardGravity, "thousandths of g"},
      {1 / kStandardGravity, "m/s^2 times 9.81"}}};
@@ -68,8 +68,8 @@ class AccelerometerCheck {
     const double tilted = Error(identity, rest);
     const double least = std::min(turned, tilted);
     if (straight < kNoticed) return;
-    if (least > kExplained || kGain * least > straight) {
-      if (straight > kUnexplained) ReportMismatch(straight);
+    if (least > kExplainedForce || kForceGain * least > straight) {
+      if (straight > kUnexplainedForce) ReportMismatch(straight);
       return;
     }
     // A permutation that fits the rates also applies to the accelerations.
@@ -104,11 +104,11 @@ class AccelerometerCheck {
   }
 
   bool IsMissing(const Eigen::Vector3d& rest) const {
-    return rest.norm() < kExplained / 2 * gravity_;
+    return rest.norm() < kExplainedForce / 2 * gravity_;
   }
 
   bool IsDown(const Eigen::Vector3d& rest) const {
-    return (rest + up_).norm() < kExplained * gravity_;
+    return (rest + up_).norm() < kExplainedForce * gravity_;
   }
 
   // The axes of the gyroscope if they fit about as well as any; otherwise, of
@@ -136,7 +136,7 @@ class AccelerometerCheck {
       ReportMissing();
       return false;
     }
-    for (const Unit& unit : kUnits) {
+    for (const ForceUnit& unit : kForceUnits) {
       const double right = ratio * unit.to_mps2;
       if (right < kRightLow || right > kRightHigh) continue;
       unit_ = unit.to_mps2;
@@ -166,14 +166,14 @@ class AccelerometerCheck {
     const double removed =
         Error(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
     double in_unit = 1;
-    for (const Unit& unit : kUnits) {
+    for (const ForceUnit& unit : kForceUnits) {
       unit_ = unit.to_mps2;
       for (const Eigen::Matrix3d& axes : SignedPermutations()) {
         in_unit = std::min(in_unit, Error(axes, up_));
       }
     }
     unit_ = 1;
-    return removed < kExplained && removed < in_unit;
+    return removed < kExplainedForce && removed < in_unit;
   }
 
   void ReportMissing() {

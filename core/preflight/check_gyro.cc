@@ -14,29 +14,30 @@
 namespace selfcal {
 namespace {
 
-// Residual shares of the rotations: one above kUnexplained needs an
+// Residual shares of the rotations: one above kUnexplainedRate needs an
 // explanation, whose residual is at most a third of that without it.
-constexpr double kUnexplained = 0.5;
-constexpr double kGain = 3;
+constexpr double kUnexplainedRate = 0.5;
+constexpr double kRateGain = 3;
 
 constexpr double kOffsetSigmas = 6;
 
-struct Unit {
+struct RateUnit {
   double to_radps;
   const char* name;
 };
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr std::array<Unit, 4> kUnits = {{{1, "rad/s"},
-                                         {kDegree, "deg/s"},
-                                         {1 / kDegree, "rad/s times pi/180"},
-                                         {1e-3 * kDegree, "mdeg/s"}}};
+constexpr std::array<RateUnit, 4> kRateUnits = {
+    {{1, "rad/s"},
+     {kDegree, "deg/s"},
+     {1 / kDegree, "rad/s times pi/180"},
+     {1e-3 * kDegree, "mdeg/s"}}};
 
-const Unit& NearestUnit(double speed_ratio) {
-  const Unit* nearest = kUnits.data();
-  const auto distance = [&](const Unit& unit) {
+const RateUnit& NearestUnit(double speed_ratio) {
+  const RateUnit* nearest = kRateUnits.data();
+  const auto distance = [&](const RateUnit& unit) {
     return std::abs(std::log(speed_ratio * unit.to_radps));
   };
-  for (const Unit& unit : kUnits) {
+  for (const RateUnit& unit : kRateUnits) {
     if (distance(unit) < distance(*nearest)) nearest = &unit;
   }
   return *nearest;
@@ -77,13 +78,13 @@ class GyroCheck {
       return {};
     }
     const double ratio = SpeedRatio(data_);
-    unit_ = ratio > 0 ? NearestUnit(ratio) : kUnits[0];
+    unit_ = ratio > 0 ? NearestUnit(ratio) : kRateUnits[0];
     const CoarseAlignment coarse = AlignRates(data_, unit_.to_radps);
     Candidate best = Fit(Eigen::Matrix3d::Identity(), coarse.straight_s);
     const double straight = best.with.share();
     if (straight > kExplained) best = BestAxes(coarse, best);
     if (best.with.share() > kExplained) {
-      if (best.with.share() > kUnexplained)
+      if (best.with.share() > kUnexplainedRate)
         ReportMismatch(best);
       else
         ReportUndetermined(best);
@@ -145,7 +146,7 @@ class GyroCheck {
       }
     }
     TryExtrinsics(coarse, &best);
-    const bool gains = kGain * best.with.share() < straight.with.share();
+    const bool gains = kRateGain * best.with.share() < straight.with.share();
     return gains ? best : straight;
   }
 
@@ -259,7 +260,7 @@ class GyroCheck {
   const Calibration& theta_;
   const MotionData& data_;
   Diagnosis* diagnosis_;
-  Unit unit_ = kUnits[0];
+  RateUnit unit_ = kRateUnits[0];
 };
 
 }  // namespace

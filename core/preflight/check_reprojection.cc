@@ -22,11 +22,12 @@ constexpr std::size_t kMinViews = 50;
 // A median error below this many pixel sigmas is not a finding.
 constexpr double kFineSigmas = 2;
 // Fractions of the pixels per radian: the error of an explanation is below
-// kExplained; one above kUnexplained needs an explanation.
-constexpr double kExplained = 0.03;
-constexpr double kUnexplained = 0.1;
+// kExplainedReprojection; one above kUnexplainedReprojection needs an
+// explanation.
+constexpr double kExplainedReprojection = 0.03;
+constexpr double kUnexplainedReprojection = 0.1;
 constexpr double kMinInFront = 0.7;
-constexpr double kGain = 3;
+constexpr double kReprojectionGain = 3;
 // Minimum difference of a scale from one, and of a shift from zero [of the
 // width]; factory calibrations are more accurate.
 constexpr double kMinScale = 0.1;
@@ -84,8 +85,8 @@ class ReprojectionCheck {
       const bool better = !best || one.error.median_px < best->error.median_px;
       if (Explains(one.error) && better) best = one;
     }
-    const bool gross =
-        fed_.median_px > kUnexplained * f_px_ || fed_.in_front < kMinInFront;
+    const bool gross = fed_.median_px > kUnexplainedReprojection * f_px_ ||
+                       fed_.in_front < kMinInFront;
     if (gross) TryLandmarkMap(&best);
     if (best) return Complete(*best);
     if (!gross) return std::nullopt;
@@ -94,8 +95,8 @@ class ReprojectionCheck {
 
  private:
   bool Explains(const ReprojectionError& error) const {
-    return error.median_px < kExplained * f_px_ &&
-           kGain * error.median_px < fed_.median_px;
+    return error.median_px < kExplainedReprojection * f_px_ &&
+           kReprojectionGain * error.median_px < fed_.median_px;
   }
 
   // A free map has so many parameters that without parallax it absorbs errors

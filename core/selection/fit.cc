@@ -5,12 +5,10 @@
 #include <cstddef>
 #include <iterator>
 
+#include "core/model/median.h"
+
 namespace selfcal {
 namespace {
-
-// Ratio of sigma to the median distance to the median, for a normal
-// distribution.
-constexpr double kSigmaOfMedianDistance = 1.4826;
 
 // Returns the lower median of at least one value.
 double Median(std::vector<double> values) {
@@ -33,7 +31,7 @@ std::optional<double> LargestOf(const std::vector<double>& fits,
   }
   const double usual = Median(measured);
   for (double& fit : measured) fit = std::abs(fit - usual);
-  const double sigma = kSigmaOfMedianDistance * Median(std::move(measured));
+  const double sigma = kMadToSigma * Median(std::move(measured));
   return std::clamp(usual + policy.max_deviations * sigma,
                     policy.least_ratio * usual,
                     policy.max_ratio * usual);

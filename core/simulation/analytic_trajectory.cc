@@ -33,7 +33,7 @@ Curve Combine(const SineSum& slow,
   return sum;
 }
 
-struct Waves {
+struct WalkWaves {
   SineSum slow_p, fast_p;      // [m]
   SineSum slow_phi, fast_phi;  // [rad]
   SineSum slow_yaw;            // [rad], the first axis alone
@@ -42,9 +42,9 @@ struct Waves {
 // Amplitudes: the walk stays within (2.2, 1.6, 0.4) m, each fast term is
 // specified by its peak acceleration or rate, so that the sum is as vigorous as
 // stated whatever frequencies are drawn.
-Waves DrawWaves(std::uint64_t seed) {
+WalkWaves DrawWalkWaves(std::uint64_t seed) {
   Random random(seed, kMotionStream);
-  Waves waves;
+  WalkWaves waves;
   const Eigen::Vector3d walk_m(2.2, 1.6, 0.4);
   for (const double share : {0.65, 0.35}) {
     waves.slow_p.Add(
@@ -83,7 +83,7 @@ class AnalyticTrajectory : public Trajectory {
   AnalyticTrajectory(double duration_s, Envelope envelope, std::uint64_t seed)
       : duration_s_(duration_s),
         envelope_(std::move(envelope)),
-        waves_(DrawWaves(seed)) {}
+        waves_(DrawWalkWaves(seed)) {}
 
   double duration_s() const override { return duration_s_; }
 
@@ -113,7 +113,7 @@ class AnalyticTrajectory : public Trajectory {
  private:
   double duration_s_;
   Envelope envelope_;
-  Waves waves_;
+  WalkWaves waves_;
 };
 
 }  // namespace

@@ -19,13 +19,14 @@ namespace {
 constexpr std::uint64_t kRotationStream = 3;
 constexpr std::uint64_t kPivotStream = 4;
 
-struct Waves {
+struct PivotWaves {
   SineSum phi, yaw, pivot;
 };
 
-Waves DrawWaves(const RotationInPlaceOptions& options, std::uint64_t seed) {
+PivotWaves DrawPivotWaves(const RotationInPlaceOptions& options,
+                          std::uint64_t seed) {
   Random random(seed, kRotationStream);
-  Waves waves;
+  PivotWaves waves;
   // Slow rotations of the whole body about the vertical.
   waves.yaw.Add(
       0.03,
@@ -70,7 +71,7 @@ class RotationInPlace final : public Trajectory {
                   std::uint64_t seed)
       : duration_s_(duration_s),
         r_I_(options.pivot_I),
-        waves_(DrawWaves(options, seed)) {}
+        waves_(DrawPivotWaves(options, seed)) {}
 
   double duration_s() const override { return duration_s_; }
 
@@ -103,7 +104,7 @@ class RotationInPlace final : public Trajectory {
  private:
   const double duration_s_;
   const Eigen::Vector3d r_I_;
-  const Waves waves_;
+  const PivotWaves waves_;
 };
 
 }  // namespace

@@ -16,8 +16,6 @@
 namespace selfcal {
 namespace {
 
-constexpr int kKinds = kStateTangentSize / 3;
-
 struct Evaluated {
   Eigen::SparseMatrix<double, Eigen::RowMajor> J;
   Eigen::VectorXd r;
@@ -51,9 +49,9 @@ Evaluated Evaluate(SegmentProblem* segment) {
 // Root mean squares by kind (rotation, velocity, position, b_a, b_g) of the
 // links of one IMU.
 std::vector<double> RootMeanSquares(const Eigen::VectorXd& whitened) {
-  std::vector<double> rms(kKinds, 0);
+  std::vector<double> rms(kStateKinds, 0);
   const Eigen::Index links = whitened.size() / kStateTangentSize;
-  for (int kind = 0; kind < kKinds; ++kind) {
+  for (int kind = 0; kind < kStateKinds; ++kind) {
     double sum = 0;
     for (Eigen::Index link = 0; link < links; ++link) {
       sum += whitened.segment<3>(kStateTangentSize * link + 3 * kind)

@@ -31,14 +31,21 @@ namespace {
 constexpr int kDevices = 60;
 constexpr std::uint64_t kFirstMotion = 20'001;
 constexpr std::uint64_t kFirstNoise = 30'001;
-constexpr int kTableSize = 7;  // a quarter of the segments of three minutes
+constexpr int kAllSegmentsTableSize =
+    7;  // a quarter of the segments of three minutes
 // The long use: a calibration at each of these numbers of segments.
 constexpr double kLongUse_s = 811;
 constexpr int kMilestones[] = {12, 25, 50, 100, 200};
 constexpr int kLongTableSize = 8;
 
-enum Kind { kTables, kScores, kEnds, kBatch, kKinds };
-constexpr const char* kNames[] = {
+enum MemoryKind {
+  kFromTables,
+  kFromScores,
+  kFromEnds,
+  kFromBatch,
+  kMemoryKinds
+};
+constexpr const char* kAllSegmentsNames[] = {
     "tables alone", "with scores of all", "with ends of all", "batch"};
 
 // A device in use, with the memory of a daemon.
@@ -75,7 +82,7 @@ class DeviceInUse {
                                   [](const Table& t) { return t.full(); });
     if (full && !calibrated_) {
       calibrated_ = true;
-      newest_ = Calibrate(kEnds).theta;
+      newest_ = Calibrate(kFromEnds).theta;
     }
   }
 
@@ -87,20 +94,20 @@ class DeviceInUse {
     return set;
   }
 
-  CalibrationResult Calibrate(Kind kind) {
+  CalibrationResult Calibrate(MemoryKind kind) {
     CalibrateOptions options = ComparedOptions();
-    if (kind == kEnds) options.remembered = Remember();
-    if (kind == kScores) options.prior = PriorByScores();
-    const CalibrationResult result =
-        selfcal::Calibrate(rig_,
-                           newest_,
-                           Pick(segments_, kind == kBatch ? Seen() : kept()),
-                           options);
-    if (kind == kEnds) reach_ = result.remembered.reach;
+    if (kind == kFromEnds) options.remembered = Remember();
+    if (kind == kFromScores) options.prior = PriorByScores();
+    const CalibrationResult result = selfcal::Calibrate(
+        rig_,
+        newest_,
+        Pick(segments_, kind == kFromBatch ? Seen() : kept()),
+        options);
+    if (kind == kFromEnds) reach_ = result.remembered.reach;
     if (result.status != CalibrateStatus::kConverged) {
       throw std::runtime_error(
           fmt::format("a calibration ({}) did not converge: {}",
-                      kNames[kind],
+                      kAllSegmentsNames[kind],
                       result.message));
     }
     return result;
@@ -158,13 +165,13 @@ class DeviceInUse {
   SegmentScorer scorer_;
 };
 
-struct Device {
+struct AllSegmentsDevice {
   Rig rig;
   Calibration truth;
   std::vector<MotionSegment> segments;
 };
 
-Device Simulated(int index, double duration_s, int table_size) {
+AllSegmentsDevice Simulated(int index, double duration_s, int table_size) {
   EvaluatedDevice device = MakeDevice();
   device.rig.table_size = table_size;
   SimulationOptions options = DatasetOptions(0);
@@ -186,19 +193,20 @@ struct DeviceRun {
   int segments = 0;
   int kept = 0;
   double reach = 0;
-  Estimate estimates[kKinds];
-  double nees[kKinds] = {};
+  Estimate estimates[kMemoryKinds];
+  double nees[kMemoryKinds] = {};
   int degrees = 0;
 };
 
 DeviceRun RunDevice(int index, double duration_s, int table_size) {
-  const Device device = Simulated(index, duration_s, table_size);
+  const AllSegmentsDevice device = Simulated(index, duration_s, table_size);
   DeviceInUse in_use(device.rig, device.segments);
   DeviceRun run;
   run.segments = static_cast<int>(device.segments.size());
   for (int i = 0; i < run.segments; ++i) in_use.Take(i);
   run.kept = static_cast<int>(in_use.kept().size());
-  for (const Kind kind : {kTables, kScores, kEnds, kBatch}) {
+  for (const MemoryKind kind :
+       {kFromTables, kFromScores, kFromEnds, kFromBatch}) {
     const CalibrationResult result = in_use.Calibrate(kind);
     run.estimates[kind] = {result.theta,
                            result.covariance.diagonal().cwiseSqrt()};
@@ -211,21 +219,21 @@ DeviceRun RunDevice(int index, double duration_s, int table_size) {
   return run;
 }
 
-ParameterStatistics StatisticsOf(Kind kind,
+ParameterStatistics StatisticsOf(MemoryKind kind,
                                  const std::vector<DeviceRun>& runs) {
   std::vector<Estimate> estimates;
   for (const DeviceRun& run : runs) estimates.push_back(run.estimates[kind]);
   return Summarise(MakeDevice().truth, estimates);
 }
 
-double MeanNees(Kind kind, const std::vector<DeviceRun>& runs) {
+double MeanNees(MemoryKind kind, const std::vector<DeviceRun>& runs) {
   std::vector<double> nees;
   for (const DeviceRun& run : runs) nees.push_back(run.nees[kind]);
   return Mean(nees);
 }
 
 void ReportDevices(const std::vector<DeviceRun>& runs, Context* context) {
-  const ParameterStatistics batch = StatisticsOf(kBatch, runs);
+  const ParameterStatistics batch = StatisticsOf(kFromBatch, runs);
   const auto count = static_cast<int>(runs.size());
   const auto [low, high] = NeesBounds(runs[0].degrees, count, 0.95);
   ResultTable table({"calibration",
@@ -238,12 +246,13 @@ void ReportDevices(const std::vector<DeviceRun>& runs, Context* context) {
                      "95 % from",
                      "to"});
   std::vector<std::pair<std::string, ParameterStatistics>> all;
-  for (const Kind kind : {kTables, kScores, kEnds, kBatch}) {
+  for (const MemoryKind kind :
+       {kFromTables, kFromScores, kFromEnds, kFromBatch}) {
     const ParameterStatistics one = StatisticsOf(kind, runs);
-    all.emplace_back(kNames[kind], one);
+    all.emplace_back(kAllSegmentsNames[kind], one);
     const auto sigmas = Ratios(one.rms_sigma, batch.rms_sigma);
     const auto errors = Ratios(one.rms_error, batch.rms_error);
-    table.Add({kNames[kind],
+    table.Add({kAllSegmentsNames[kind],
                MedianOf(Ratios(one.spread, batch.spread)),
                MedianOf(errors),
                Rms(errors),
@@ -255,7 +264,7 @@ void ReportDevices(const std::vector<DeviceRun>& runs, Context* context) {
   }
   context->WriteTable("all_segments", table);
   context->WriteTable("parameters", CompareParameters(MakeDevice().truth, all));
-  const ParameterStatistics& ends = all[kEnds].second;
+  const ParameterStatistics& ends = all[kFromEnds].second;
   context->AtMost("all_segments.spread_ratio_median",
                   MedianOf(Ratios(ends.spread, batch.spread)),
                   1.1);
@@ -272,7 +281,8 @@ void ReportDevices(const std::vector<DeviceRun>& runs, Context* context) {
     segments += run.segments;
   }
   context->AtMost("all_segments.kept_part", kept / segments, 0.25);
-  context->Within("all_segments.nees_mean", MeanNees(kEnds, runs), low, high);
+  context->Within(
+      "all_segments.nees_mean", MeanNees(kFromEnds, runs), low, high);
 }
 
 // Median over the parameters of the sigma against that of another.
@@ -285,7 +295,7 @@ double SigmaRatio(const CalibrationResult& a, const CalibrationResult& b) {
 void RunLongUse(Context* context) {
   const double duration_s = context->quick() ? 61 : kLongUse_s;
   const int table_size = context->quick() ? 2 : kLongTableSize;
-  const Device device = Simulated(kDevices, duration_s, table_size);
+  const AllSegmentsDevice device = Simulated(kDevices, duration_s, table_size);
   DeviceInUse in_use(device.rig, device.segments);
   const auto count = static_cast<int>(device.segments.size());
   ResultTable table({"segments",
@@ -300,8 +310,9 @@ void RunLongUse(Context* context) {
             .y_label = "sigma / that of the first calibration (median)",
             .log_x = true,
             .log_y = true};
-  Series ends{.label = kNames[kEnds]}, batch{.label = kNames[kBatch]},
-      tables{.label = kNames[kTables]};
+  Series ends{.label = kAllSegmentsNames[kFromEnds]},
+      batch{.label = kAllSegmentsNames[kFromBatch]},
+      tables{.label = kAllSegmentsNames[kFromTables]};
   std::optional<CalibrationResult> first;
   double last_ratio = 0;
   int taken = 0;
@@ -309,9 +320,9 @@ void RunLongUse(Context* context) {
     const int end = std::min(milestone, count);
     if (taken == end) break;
     while (taken < end) in_use.Take(taken++);
-    const CalibrationResult informed = in_use.Calibrate(kEnds);
-    const CalibrationResult all = in_use.Calibrate(kBatch);
-    const CalibrationResult alone = in_use.Calibrate(kTables);
+    const CalibrationResult informed = in_use.Calibrate(kFromEnds);
+    const CalibrationResult all = in_use.Calibrate(kFromBatch);
+    const CalibrationResult alone = in_use.Calibrate(kFromTables);
     in_use.Activate(informed.theta);
     if (!first) first = informed;
     last_ratio = SigmaRatio(informed, all);
@@ -345,7 +356,7 @@ void RunLongUse(Context* context) {
 void RunAllSegments(Context* context) {
   const int count = context->quick() ? 4 : kDevices;
   const double duration_s = context->quick() ? 41 : kDatasetDuration_s;
-  const int table_size = context->quick() ? 2 : kTableSize;
+  const int table_size = context->quick() ? 2 : kAllSegmentsTableSize;
   std::vector<DeviceRun> runs(static_cast<std::size_t>(count));
   context->ForEach(count, [&](int i) {
     runs[i] = RunDevice(i, duration_s, table_size);

@@ -19,66 +19,74 @@ namespace {
 
 // What the tables of the rig give, another size of them, batch, and the
 // incremental information gain.
-enum Kind { kInformative, kOneBound, kBatch, kGain, kKinds };
-constexpr const char* kNames[] = {
+enum MatchKind {
+  kMatchInformative,
+  kMatchOneBound,
+  kMatchBatch,
+  kMatchGain,
+  kMatchKinds
+};
+constexpr const char* kBatchMatchNames[] = {
     "informative", "single bound", "batch", "information gain"};
 
-struct DatasetRun {
+struct BatchMatchDatasetRun {
   std::string name;
   bool whole = false;  // of full length
   int segments = 0;
-  int kept[kKinds] = {};
-  Estimate estimates[kKinds];
+  int kept[kMatchKinds] = {};
+  Estimate estimates[kMatchKinds];
 };
 
 Estimate ToEstimate(const CalibrationResult& result) {
   return {result.theta, result.covariance.diagonal().cwiseSqrt()};
 }
 
-DatasetRun RunDataset(int index, double duration_s, int table_size) {
+BatchMatchDatasetRun RunDataset(int index, double duration_s, int table_size) {
   Dataset dataset = MakeDataset(index, duration_s);
   dataset.rig.table_size = table_size;
   const std::vector<MotionSegment>& segments = dataset.segments();
   const auto count = static_cast<int>(segments.size());
-  DatasetRun run;
+  BatchMatchDatasetRun run;
   run.name = dataset.name;
   run.whole = dataset.duration_s >= duration_s;
   run.segments = count;
-  const auto add =
-      [&](Kind kind, const SegmentSet& set, const CalibrationResult& result) {
-        run.kept[kind] = static_cast<int>(set.size());
-        run.estimates[kind] = ToEstimate(result);
-      };
+  const auto add = [&](MatchKind kind,
+                       const SegmentSet& set,
+                       const CalibrationResult& result) {
+    run.kept[kind] = static_cast<int>(set.size());
+    run.estimates[kind] = ToEstimate(result);
+  };
   const std::vector<SegmentInformation> scores =
       ScoreAll(dataset.rig, segments);
   const SegmentSet informative = MostInformative(dataset.rig, scores);
-  add(kInformative,
+  add(kMatchInformative,
       informative,
       CalibrateOn(dataset.rig, segments, informative));
   const SegmentSet single =
       SingleGroup(dataset.rig, dataset.rig.table_size, scores);
-  add(kOneBound, single, CalibrateOn(dataset.rig, segments, single));
+  add(kMatchOneBound, single, CalibrateOn(dataset.rig, segments, single));
   const SegmentSet all = AllSegments(count);
-  add(kBatch, all, CalibrateOn(dataset.rig, segments, all));
+  add(kMatchBatch, all, CalibrateOn(dataset.rig, segments, all));
   const GainResult gain = RunInformationGain(dataset.rig, segments, {});
-  add(kGain, gain.kept, gain.calibration);
+  add(kMatchGain, gain.kept, gain.calibration);
   return run;
 }
 
-ParameterStatistics StatisticsOf(Kind kind,
-                                 const std::vector<DatasetRun>& runs) {
+ParameterStatistics StatisticsOf(
+    MatchKind kind, const std::vector<BatchMatchDatasetRun>& runs) {
   std::vector<Estimate> estimates;
-  for (const DatasetRun& run : runs) estimates.push_back(run.estimates[kind]);
+  for (const BatchMatchDatasetRun& run : runs)
+    estimates.push_back(run.estimates[kind]);
   return Summarise(MakeDevice().truth, estimates);
 }
 
 // Kept segments as a part of all, over the datasets together.
-double KeptPart(Kind kind,
+double KeptPart(MatchKind kind,
                 bool whole_ones_alone,
-                const std::vector<DatasetRun>& runs) {
+                const std::vector<BatchMatchDatasetRun>& runs) {
   double kept = 0;
   double all = 0;
-  for (const DatasetRun& run : runs) {
+  for (const BatchMatchDatasetRun& run : runs) {
     if (whole_ones_alone && !run.whole) continue;
     kept += run.kept[kind];
     all += run.segments;
@@ -86,19 +94,19 @@ double KeptPart(Kind kind,
   return kept / all;
 }
 
-void WriteSegments(const std::vector<DatasetRun>& runs,
+void WriteSegments(const std::vector<BatchMatchDatasetRun>& runs,
                    const Context& context) {
   ResultTable table({"dataset",
                      "segments",
                      "informative",
                      "single bound",
                      "information gain"});
-  for (const DatasetRun& run : runs) {
+  for (const BatchMatchDatasetRun& run : runs) {
     table.Add({run.name,
                run.segments,
-               run.kept[kInformative],
-               run.kept[kOneBound],
-               run.kept[kGain]});
+               run.kept[kMatchInformative],
+               run.kept[kMatchOneBound],
+               run.kept[kMatchGain]});
   }
   context.WriteTable("segments", table);
 }
@@ -149,9 +157,10 @@ void PlotSpreads(const ParameterStatistics& batch,
   context.WritePlot("spreads", plot);
 }
 
-void CheckFigures(const std::vector<DatasetRun>& runs, Context* context) {
-  const ParameterStatistics batch = StatisticsOf(kBatch, runs);
-  const ParameterStatistics informative = StatisticsOf(kInformative, runs);
+void CheckFigures(const std::vector<BatchMatchDatasetRun>& runs,
+                  Context* context) {
+  const ParameterStatistics batch = StatisticsOf(kMatchBatch, runs);
+  const ParameterStatistics informative = StatisticsOf(kMatchInformative, runs);
   const std::vector<double> spreads = Ratios(informative.spread, batch.spread);
   context->AtMost(
       "batch_match.spread_ratio_median.goal", MedianOf(spreads), 1.5);
@@ -164,16 +173,16 @@ void CheckFigures(const std::vector<DatasetRun>& runs, Context* context) {
                   MedianOf(Ratios(informative.rms_error, batch.rms_error)),
                   1.5);
   context->AtMost("batch_match.kept_part_of_three_minutes",
-                  KeptPart(kInformative, true, runs),
+                  KeptPart(kMatchInformative, true, runs),
                   0.25);
   context->AtMost("batch_match.kept_part_of_all",
-                  KeptPart(kInformative, false, runs),
+                  KeptPart(kMatchInformative, false, runs),
                   0.25);
   // A fair claim: of an estimator whose sigma is right, the rms error is one
   // sigma; over all parameters and datasets.
-  for (const Kind kind : {kInformative, kBatch, kGain}) {
+  for (const MatchKind kind : {kMatchInformative, kMatchBatch, kMatchGain}) {
     const ParameterStatistics one = StatisticsOf(kind, runs);
-    std::string name = kNames[kind];
+    std::string name = kBatchMatchNames[kind];
     std::replace(name.begin(), name.end(), ' ', '_');
     context->Within("batch_match.error_in_sigmas_" + name,
                     Rms(Ratios(one.rms_error, one.rms_sigma)),
@@ -189,25 +198,26 @@ void RunBatchMatch(Context* context) {
   const int count = context->quick() ? 3 : kDatasets;
   const double duration_s = context->quick() ? 29 : kDatasetDuration_s;
   const int table_size = context->quick() ? 2 : 8;
-  std::vector<DatasetRun> runs(static_cast<std::size_t>(count));
+  std::vector<BatchMatchDatasetRun> runs(static_cast<std::size_t>(count));
   context->ForEach(count, [&](int i) {
     runs[i] = RunDataset(i, duration_s, table_size);
     context->Progress(fmt::format("{}: {} segments, kept {}, gain {}",
                                   runs[i].name,
                                   runs[i].segments,
-                                  runs[i].kept[kInformative],
-                                  runs[i].kept[kGain]));
+                                  runs[i].kept[kMatchInformative],
+                                  runs[i].kept[kMatchGain]));
   });
   std::vector<std::pair<std::string, ParameterStatistics>> all;
-  for (const Kind kind : {kInformative, kOneBound, kBatch, kGain}) {
-    all.emplace_back(kNames[kind], StatisticsOf(kind, runs));
+  for (const MatchKind kind :
+       {kMatchInformative, kMatchOneBound, kMatchBatch, kMatchGain}) {
+    all.emplace_back(kBatchMatchNames[kind], StatisticsOf(kind, runs));
   }
   context->WriteTable("parameters", CompareParameters(MakeDevice().truth, all));
   WriteRotations(all, *context);
   WriteSegments(runs, *context);
-  PlotSpreads(all[kBatch].second,
-              all[kInformative].second,
-              all[kGain].second,
+  PlotSpreads(all[kMatchBatch].second,
+              all[kMatchInformative].second,
+              all[kMatchGain].second,
               *context);
   CheckFigures(runs, context);
 }

@@ -11,17 +11,17 @@
 namespace selfcal {
 namespace {
 
-constexpr int kBefore = 8;  // segments before the change
+constexpr int kDelayBefore = 8;  // segments before the change
 constexpr int kLongest = 64;
 constexpr int kPlotted = 32;
 
-struct Scenario {
+struct DelayScenario {
   DeviceChange change;
   std::string figure;  // change.delay_<figure>
 };
 
-const std::vector<Scenario>& Scenarios() {
-  static const std::vector<Scenario> scenarios = {
+const std::vector<DelayScenario>& Scenarios() {
+  static const std::vector<DelayScenario> scenarios = {
       {{"turn 0.2 deg", "extrinsics", false, 0.2, 0}, "turn_0.2_deg"},
       {{"turn 0.5 deg", "extrinsics", false, 0.5, 0}, "turn_0.5_deg"},
       {{"turn 1 deg", "extrinsics", false, 1, 0}, "turn_1_deg"},
@@ -46,11 +46,11 @@ Detection Detect(const ChangeDevice& device,
                  const DeviceChange& scenario,
                  std::uint64_t seed) {
   const ConsistencyTester tester(device.rig, device.active);
-  const ChangeUse use(device, kBefore + kLongest, seed);
+  const ChangeUse use(device, kDelayBefore + kLongest, seed);
   Detection detection;
   std::vector<OffsetInformation> newest;
-  for (int i = 0; i < kBefore + kLongest; ++i) {
-    const int after = i - kBefore + 1;
+  for (int i = 0; i < kDelayBefore + kLongest; ++i) {
+    const int after = i - kDelayBefore + 1;
     const Calibration truth =
         after > 0 ? scenario.After(device.truth, after) : device.truth;
     const auto information =

@@ -16,7 +16,7 @@
 namespace selfcal {
 namespace {
 
-constexpr double kLevel = 0.01;
+constexpr double kChangeLevel = 0.01;
 constexpr double kByChance = 1e-3;
 
 // What the device says of itself in use, without a change.
@@ -54,7 +54,7 @@ struct Counts {
 
   void Add(const ConsistencyTest& test) {
     ++tests;
-    alarms += test.probability < kLevel;
+    alarms += test.probability < kChangeLevel;
     statistic += test.statistic;
     degrees += test.degrees;
   }
@@ -118,7 +118,7 @@ void ReportSingle(const Rig& rig,
                counts.statistic / counts.degrees,
                static_cast<long>(counts.alarms),
                static_cast<double>(counts.alarms) / counts.tests,
-               BinomialTail(counts.alarms, counts.tests, kLevel)});
+               BinomialTail(counts.alarms, counts.tests, kChangeLevel)});
   };
   add("all", sum.all);
   for (std::size_t q = 0; q < sum.groups.size(); ++q) {
@@ -128,7 +128,7 @@ void ReportSingle(const Rig& rig,
   const double tests = sum.all.tests;
   context->AtMost("change.single_alarm_rate",
                   sum.all.alarms / tests,
-                  LargestByChance(sum.all.tests, kLevel) / tests,
+                  LargestByChance(sum.all.tests, kChangeLevel) / tests,
                   {.robust = true});
   context->Within("change.statistic_over_degrees",
                   sum.all.statistic / sum.all.degrees,

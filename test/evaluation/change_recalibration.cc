@@ -18,9 +18,9 @@
 namespace selfcal {
 namespace {
 
-constexpr int kBefore = 8;  // segments before the shock
-constexpr int kAfter = 8;   // that a run is on
-constexpr int kMost = 32;   // segments of a device
+constexpr int kRecalibrationBefore = 8;  // segments before the shock
+constexpr int kAfter = 8;                // that a run is on
+constexpr int kMost = 32;                // segments of a device
 
 const DeviceChange kShock{"turn 0.5 deg", "extrinsics", false, 0.5, 0};
 
@@ -39,7 +39,8 @@ Sent UseUntilRun(const ChangeDevice& device, std::uint64_t seed) {
   Sent sent;
   std::vector<OffsetInformation> newest;
   for (int i = 0; i < kMost; ++i) {
-    sent.segments.push_back(use.Segment(i, i < kBefore ? device.truth : after));
+    sent.segments.push_back(
+        use.Segment(i, i < kRecalibrationBefore ? device.truth : after));
     sent.information.push_back(
         ScoreSegment(device.rig, device.active.theta, sent.segments.back()));
     if (sent.concerned.empty()) {
@@ -80,29 +81,29 @@ ThetaPrior KnownAfter(const ChangeDevice& device, const Sent& sent) {
                        UnconcernedComponents(device.rig, sent.concerned));
 }
 
-struct Outcome {
+struct RecalibrationOutcome {
   double segments = 0;
   double from_before = 0;
   double turn_error_deg = 0;  // of the camera
   double nees = 0;            // of all that is estimated, by its dimension
 };
 
-Outcome CalibrateAfter(const ChangeDevice& device,
-                       const std::vector<MotionSegment>& segments,
-                       const CalibrateOptions& options) {
+RecalibrationOutcome CalibrateAfter(const ChangeDevice& device,
+                                    const std::vector<MotionSegment>& segments,
+                                    const CalibrateOptions& options) {
   const CalibrationResult result =
       Calibrate(device.rig, device.active.theta, segments, options);
   if (result.status != CalibrateStatus::kConverged) {
     throw std::runtime_error("a calibration after a shock: " + result.message);
   }
   const Calibration truth = kShock.After(device.truth, 1);
-  Outcome outcome;
+  RecalibrationOutcome outcome;
   outcome.segments = static_cast<double>(segments.size());
   for (const MotionSegment& segment : segments) {
     // Sessions are named by the order of their segments.
     outcome.from_before +=
         std::stoi(segment.key.session.substr(std::string("use-").size())) <
-        kBefore;
+        kRecalibrationBefore;
   }
   outcome.turn_error_deg =
       result.theta.cameras[0].q_CI.angularDistance(truth.cameras[0].q_CI) *
@@ -113,22 +114,24 @@ Outcome CalibrateAfter(const ChangeDevice& device,
   return outcome;
 }
 
-struct Summary {
+struct RecalibrationSummary {
   double segments = 0, from_before = 0, turn_error_deg = 0, nees = 0;
 };
 
-Summary Add(const std::string& name,
-            const std::vector<Outcome>& outcomes,
-            ResultTable* table) {
-  const auto of = [&](double Outcome::*value) {
+RecalibrationSummary Add(const std::string& name,
+                         const std::vector<RecalibrationOutcome>& outcomes,
+                         ResultTable* table) {
+  const auto of = [&](double RecalibrationOutcome::*value) {
     std::vector<double> values;
-    for (const Outcome& outcome : outcomes) values.push_back(outcome.*value);
+    for (const RecalibrationOutcome& outcome : outcomes)
+      values.push_back(outcome.*value);
     return values;
   };
-  const Summary summary{Mean(of(&Outcome::segments)),
-                        Mean(of(&Outcome::from_before)),
-                        Rms(of(&Outcome::turn_error_deg)),
-                        Mean(of(&Outcome::nees))};
+  const RecalibrationSummary summary{
+      Mean(of(&RecalibrationOutcome::segments)),
+      Mean(of(&RecalibrationOutcome::from_before)),
+      Rms(of(&RecalibrationOutcome::turn_error_deg)),
+      Mean(of(&RecalibrationOutcome::nees))};
   table->Add({name,
               static_cast<long>(outcomes.size()),
               summary.segments,
@@ -143,7 +146,7 @@ Summary Add(const std::string& name,
 void RunChangeRecalibrations(const std::vector<ChangeDevice>& devices,
                              Context* context) {
   const int runs = context->quick() ? 1 : 20;
-  std::vector<Outcome> since(runs), mixed(runs);
+  std::vector<RecalibrationOutcome> since(runs), mixed(runs);
   context->ForEach(runs, [&](int i) {
     const ChangeDevice& device = devices[i % devices.size()];
     const Sent sent = UseUntilRun(device, 5000 + i);
@@ -160,8 +163,9 @@ void RunChangeRecalibrations(const std::vector<ChangeDevice>& devices,
                      "of these from before",
                      "rotation error, rms [deg]",
                      "NEES / dimension"});
-  const Summary after = Add("tables restarted", since, &table);
-  const Summary without = Add("tables as they were", mixed, &table);
+  const RecalibrationSummary after = Add("tables restarted", since, &table);
+  const RecalibrationSummary without =
+      Add("tables as they were", mixed, &table);
   context->WriteTable("recalibration", table);
   context->AtMost("change.segments_from_before_in_calibration",
                   after.from_before,

@@ -15,7 +15,7 @@
 namespace selfcal {
 namespace {
 
-constexpr double kLevel = 0.01;
+constexpr double kRecordedLevel = 0.01;
 
 struct Half {
   std::string name;
@@ -63,7 +63,7 @@ Tested TestOthers(const Rig& rig,
     ++tested.segments;
     newest.push_back(tester.Offset(information));
     const ConsistencyTest test = tester.Test(newest.back());
-    tested.rare += test.probability < kLevel;
+    tested.rare += test.probability < kRecordedLevel;
     tested.statistic += test.statistic;
     tested.degrees += test.degrees;
     if (DetectChange(tester, newest)) {

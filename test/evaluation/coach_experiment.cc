@@ -39,7 +39,7 @@ struct WayOutcome {
   std::vector<std::string> motions;
 };
 
-struct Outcome {
+struct CoachOutcome {
   std::string device;
   double targets[2] = {};
   std::map<Way, WayOutcome> ways;
@@ -71,11 +71,11 @@ void CompareWithTruth(const CoachedDevice& device,
   outcome->nees = square / dof;
 }
 
-Outcome RunOne(int rig, std::uint64_t seed, bool quick) {
+CoachOutcome RunOne(int rig, std::uint64_t seed, bool quick) {
   const auto& mixed_segments = quick ? kQuickMixedSegments : kMixedSegments;
   const int most = mixed_segments[1];
   const CoachedDevice device = MakeCoachedDevice(rig, seed);
-  Outcome outcome;
+  CoachOutcome outcome;
   outcome.device = device.name;
   const CoachRecording mixed = Record(device, Way::kMixed, most, seed);
   for (int i = 0; i < 2; ++i) {
@@ -109,11 +109,11 @@ struct WaySeries {
   int converged = 0;
 };
 
-WaySeries Collect(const std::vector<Outcome>& all,
+WaySeries Collect(const std::vector<CoachOutcome>& all,
                   const std::string& device,
                   Way way) {
   WaySeries series;
-  for (const Outcome& one : all) {
+  for (const CoachOutcome& one : all) {
     if (one.device != device) continue;
     const WayOutcome& of = one.ways.at(way);
     const WayOutcome& coached = one.ways.at(Way::kCoached);
@@ -134,7 +134,7 @@ WaySeries Collect(const std::vector<Outcome>& all,
   return series;
 }
 
-void TabulateTimes(const std::vector<Outcome>& all,
+void TabulateTimes(const std::vector<CoachOutcome>& all,
                    const std::vector<std::string>& devices,
                    Context* context) {
   ResultTable times({"device",
@@ -186,14 +186,14 @@ void TabulateTimes(const std::vector<Outcome>& all,
   context->WriteTable("truth", truth);
 }
 
-void TabulateMotions(const std::vector<Outcome>& all,
+void TabulateMotions(const std::vector<CoachOutcome>& all,
                      const std::vector<std::string>& devices,
                      const Context& context) {
   ResultTable table({"device", "motion", "share of the coached segments"});
   for (const std::string& device : devices) {
     std::map<std::string, long> counts;
     long sum = 0;
-    for (const Outcome& one : all) {
+    for (const CoachOutcome& one : all) {
       if (one.device != device) continue;
       for (const auto& motion : one.ways.at(Way::kCoached).motions) {
         ++counts[motion];
@@ -287,7 +287,7 @@ void ComparePredictions(int seeds, Context* context) {
 void RunCoach(Context* context) {
   const int seeds = context->quick() ? 1 : 10;
   const int rigs = context->quick() ? 1 : kCoachedRigs;
-  std::vector<Outcome> all(rigs * seeds);
+  std::vector<CoachOutcome> all(rigs * seeds);
   context->ForEach(rigs * seeds, [&](int i) {
     all[i] = RunOne(
         i / seeds, static_cast<std::uint64_t>(i % seeds) + 1, context->quick());

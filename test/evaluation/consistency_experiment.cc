@@ -20,14 +20,14 @@ constexpr int kRuns = 100;
 constexpr int kQuickRuns = 4;
 constexpr double kDuration_s = 40.5;
 constexpr double kQuickDuration_s = 16.5;
-constexpr int kTableSize = 2;
+constexpr int kConsistencyTableSize = 2;
 // New tracks of landmarks that were seen before, so that some are split between
 // the partitions of a calibration.
 constexpr double kFoundAgain = 0.02;
 constexpr double kProbability = 0.95;
 // Of many parameters some lie outside of 95 %: each is held to this instead.
 constexpr double kParameterProbability = 0.999;
-constexpr std::uint64_t kFirstSeed = 5001;
+constexpr std::uint64_t kConsistencyFirstSeed = 5001;
 
 enum Kind {
   kBatch,
@@ -39,29 +39,30 @@ enum Kind {
   kGain = kSelected,
   kKinds
 };
-constexpr std::array<const char*, kKinds> kNames = {"batch",
-                                                    "informative",
-                                                    "random",
-                                                    "least",
-                                                    "single_group",
-                                                    "information_gain"};
+constexpr std::array<const char*, kKinds> kConsistencyNames = {
+    "batch",
+    "informative",
+    "random",
+    "least",
+    "single_group",
+    "information_gain"};
 
 // An error in its own sigmas, where the solver converged and no direction of
 // theta was held.
-struct Outcome {
+struct ConsistencyOutcome {
   std::optional<double> nees;
   Eigen::VectorXd sigmas;
   long segments = 0;
 };
 
-struct Run {
-  std::array<Outcome, kKinds> outcomes;
+struct ConsistencyRun {
+  std::array<ConsistencyOutcome, kKinds> outcomes;
 };
 
-Outcome Compare(const CalibrationResult& result,
-                const Calibration& truth,
-                const std::vector<int>& free) {
-  Outcome outcome;
+ConsistencyOutcome Compare(const CalibrationResult& result,
+                           const Calibration& truth,
+                           const std::vector<int>& free) {
+  ConsistencyOutcome outcome;
   outcome.segments = result.segments;
   if (result.status == CalibrateStatus::kConverged &&
       result.held_constant.empty()) {
@@ -74,11 +75,11 @@ Outcome Compare(const CalibrationResult& result,
 }
 
 // Each run has another device, motion and noise.
-Run RunDevice(std::uint64_t seed, double duration_s) {
+ConsistencyRun RunDevice(std::uint64_t seed, double duration_s) {
   Rig rig = HandheldRig("consistency");
   const Calibration truth = rig.factory;
   rig.factory = PerturbCalibration(truth, {}, seed);
-  rig.table_size = kTableSize;
+  rig.table_size = kConsistencyTableSize;
   SimulationOptions options;
   options.seed = seed;
   options.revisit_fraction = kFoundAgain;
@@ -101,7 +102,7 @@ Run RunDevice(std::uint64_t seed, double duration_s) {
   sets[kLeast] = LeastInformative(rig, scores);
   sets[kSingle] = SingleGroup(rig, kept, scores);
   const std::vector<int> free = FreeComponents(rig);
-  Run run;
+  ConsistencyRun run;
   for (int kind = 0; kind < kSelected; ++kind) {
     const std::vector<MotionSegment> picked = Pick(segments, sets[kind]);
     run.outcomes[kind] = Compare(
@@ -113,7 +114,7 @@ Run RunDevice(std::uint64_t seed, double duration_s) {
 }
 
 // Of one estimator over the runs with an outcome.
-struct Summary {
+struct ConsistencySummary {
   std::vector<double> nees;
   double segments = 0;  // mean over all runs
   // By parameter: runs within 1, 2, 3 sigma, and mean error.
@@ -121,12 +122,14 @@ struct Summary {
   Eigen::VectorXd mean_sigmas;
 };
 
-Summary Summarise(const std::vector<Run>& runs, int kind, int parameters) {
-  Summary summary;
+ConsistencySummary Summarise(const std::vector<ConsistencyRun>& runs,
+                             int kind,
+                             int parameters) {
+  ConsistencySummary summary;
   summary.within = Eigen::MatrixXi::Zero(parameters, 3);
   summary.mean_sigmas = Eigen::VectorXd::Zero(parameters);
-  for (const Run& run : runs) {
-    const Outcome& outcome = run.outcomes[kind];
+  for (const ConsistencyRun& run : runs) {
+    const ConsistencyOutcome& outcome = run.outcomes[kind];
     summary.segments += static_cast<double>(outcome.segments) /
                         static_cast<double>(runs.size());
     if (!outcome.nees) continue;
@@ -144,7 +147,7 @@ Summary Summarise(const std::vector<Run>& runs, int kind, int parameters) {
 }
 
 // How many parameters are covered more or less often than chance allows.
-long OutsideBounds(const Summary& summary) {
+long OutsideBounds(const ConsistencySummary& summary) {
   long outside = 0;
   for (int k = 0; k < 3; ++k) {
     const auto [low, high] =
@@ -159,7 +162,7 @@ long OutsideBounds(const Summary& summary) {
 }
 
 void AddParameters(const std::string& name,
-                   const Summary& summary,
+                   const ConsistencySummary& summary,
                    const std::vector<TangentComponent>& components,
                    ResultTable* table) {
   const auto runs = static_cast<double>(summary.nees.size());
@@ -174,7 +177,7 @@ void AddParameters(const std::string& name,
   }
 }
 
-void Report(const std::vector<Run>& runs, Context* context) {
+void Report(const std::vector<ConsistencyRun>& runs, Context* context) {
   const Rig rig = HandheldRig("consistency");
   std::vector<TangentComponent> components;
   for (const int i : FreeComponents(rig)) {
@@ -198,8 +201,8 @@ void Report(const std::vector<Run>& runs, Context* context) {
             .x_label = "NEES, 26 dimensions",
             .y_label = "runs"};
   for (int kind = 0; kind < kKinds; ++kind) {
-    const Summary summary = Summarise(runs, kind, parameters);
-    const std::string name = kNames[kind];
+    const ConsistencySummary summary = Summarise(runs, kind, parameters);
+    const std::string name = kConsistencyNames[kind];
     const auto count = static_cast<int>(summary.nees.size());
     context->AtLeast("consistency." + name + ".runs_with_outcome",
                      count,
@@ -235,9 +238,10 @@ void Report(const std::vector<Run>& runs, Context* context) {
 void RunConsistency(Context* context) {
   const int count = context->quick() ? kQuickRuns : kRuns;
   const double duration_s = context->quick() ? kQuickDuration_s : kDuration_s;
-  std::vector<Run> runs(static_cast<std::size_t>(count));
+  std::vector<ConsistencyRun> runs(static_cast<std::size_t>(count));
   context->ForEach(count, [&](int i) {
-    runs[i] = RunDevice(kFirstSeed + static_cast<std::uint64_t>(i), duration_s);
+    runs[i] = RunDevice(kConsistencyFirstSeed + static_cast<std::uint64_t>(i),
+                        duration_s);
     context->Progress("device " + std::to_string(i + 1));
   });
   Report(runs, context);

@@ -20,11 +20,11 @@
 namespace selfcal {
 namespace {
 
-struct Motion {
+struct DegenerateMotion {
   MotionKind kind;
   const char* name;
 };
-constexpr Motion kMotions[] = {
+constexpr DegenerateMotion kMotions[] = {
     {MotionKind::kRest, "rest"},
     {MotionKind::kConstantVelocity, "constant_velocity"},
     {MotionKind::kOneAxis, "one_axis"},
@@ -34,7 +34,7 @@ constexpr Motion kMotions[] = {
     {MotionKind::kHandheld, "hand_held"},
 };
 
-struct Run {
+struct DegenerateRun {
   bool refused = false;  // not converged
   int rank = 0;
   double nees = 0;       // of the estimated directions
@@ -45,7 +45,7 @@ struct Run {
   std::vector<std::string> held;  // the main part of each direction
 };
 
-Run RunOne(const Motion& motion, std::uint64_t seed) {
+DegenerateRun RunOne(const DegenerateMotion& motion, std::uint64_t seed) {
   std::mt19937 random(
       static_cast<unsigned>(seed * 100 + static_cast<int>(motion.kind)));
   Rig rig = HandheldRig("simulated");
@@ -65,7 +65,7 @@ Run RunOne(const Motion& motion, std::uint64_t seed) {
   const CalibrationResult result = Calibrate(rig, rig.factory, segments);
   // What is held stays where a calibration starts from: here, at the truth.
   const CalibrationResult known = Calibrate(rig, truth, segments);
-  Run run;
+  DegenerateRun run;
   run.refused = result.status != CalibrateStatus::kConverged;
   if (run.refused) return run;
   run.rank = result.rank;
@@ -101,7 +101,7 @@ Run RunOne(const Motion& motion, std::uint64_t seed) {
 }
 
 // Over the runs of a motion that were not refused.
-struct Summary {
+struct DegenerateSummary {
   int refused = 0;
   int degrees = 0;
   double mean_rank = 0;
@@ -111,11 +111,11 @@ struct Summary {
   std::map<std::string, int> held;
 };
 
-Summary Summarise(const std::vector<Run>& runs) {
-  Summary summary;
+DegenerateSummary Summarise(const std::vector<DegenerateRun>& runs) {
+  DegenerateSummary summary;
   double nees = 0;
   std::vector<double> errors, errors_if_known;
-  for (const Run& run : runs) {
+  for (const DegenerateRun& run : runs) {
     summary.refused += run.refused;
     if (run.refused) continue;
     summary.degrees += run.rank;
@@ -138,7 +138,7 @@ Summary Summarise(const std::vector<Run>& runs) {
 }
 
 // Names of what is held in more than half of the runs, and of what in fewer.
-std::string Names(const Summary& summary, int runs, bool often) {
+std::string Names(const DegenerateSummary& summary, int runs, bool often) {
   std::string names;
   for (const auto& [name, count] : summary.held) {
     if ((2 * count > runs) != often) continue;
@@ -169,13 +169,13 @@ void RunDegenerate(Context* context) {
                 .style = SeriesStyle::kBars};
   double largest_z = 0;
   int refused = 0;
-  for (const Motion& motion : kMotions) {
-    std::vector<Run> all(runs);
+  for (const DegenerateMotion& motion : kMotions) {
+    std::vector<DegenerateRun> all(runs);
     context->ForEach(runs, [&](int i) {
       all[i] = RunOne(motion, static_cast<std::uint64_t>(i) + 1);
     });
     context->Progress(motion.name);
-    const Summary summary = Summarise(all);
+    const DegenerateSummary summary = Summarise(all);
     largest_z = std::max(largest_z, summary.largest_z);
     refused += summary.refused;
     held.Add({motion.name,

@@ -11,18 +11,18 @@
 namespace selfcal {
 namespace {
 
-constexpr int kFirstDevice = 42000;  // seeds of their own
-constexpr int kLongest = 90;         // segments
+constexpr int kFocalDriftFirstDevice = 42000;  // seeds of their own
+constexpr int kLongest = 90;                   // segments
 constexpr double kDrift_px_s = 1.0 / 600;
 
-struct Outcome {
+struct FocalDriftOutcome {
   double sigma_px = 0;  // of the active calibration
   std::optional<double> found_px;
   bool group = false;
   bool drift = false;
 };
 
-Outcome Run(int index) {
+FocalDriftOutcome Run(int index) {
   const ChangeDevice device =
       MakeChangeDevice(index, *MakeMixed(12 * kChangeSegment_s + 0.5, index));
   const auto components = TangentComponents(device.truth);
@@ -32,7 +32,7 @@ Outcome Run(int index) {
       "drift", "camera", true, 0, px / device.truth.cameras[0].f(0)};
   const ConsistencyTester tester(device.rig, device.active);
   const ChangeUse use(device, kLongest, index);
-  Outcome outcome;
+  FocalDriftOutcome outcome;
   outcome.sigma_px = std::sqrt(device.active.covariance(focal, focal));
   std::vector<OffsetInformation> newest;
   for (int n = 1; n <= kLongest; ++n) {
@@ -54,8 +54,9 @@ Outcome Run(int index) {
 
 void RunDriftFocal(Context* context) {
   const int devices = context->quick() ? 1 : 8;
-  std::vector<Outcome> all(devices);
-  context->ForEach(devices, [&](int i) { all[i] = Run(kFirstDevice + i); });
+  std::vector<FocalDriftOutcome> all(devices);
+  context->ForEach(devices,
+                   [&](int i) { all[i] = Run(kFocalDriftFirstDevice + i); });
   ResultTable table({"device",
                      "sigma of the active calibration [px]",
                      "found at [px]",

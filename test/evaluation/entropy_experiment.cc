@@ -17,8 +17,8 @@
 namespace selfcal {
 namespace {
 
-enum Choice { kMost, kLeast, kRandom, kChoices };
-constexpr const char* kNames[] = {
+enum Choice { kChooseMost, kChooseLeast, kChooseRandom, kChoices };
+constexpr const char* kEntropyNames[] = {
     "most informative", "least informative", "random"};
 
 struct Sizes {
@@ -35,7 +35,7 @@ struct Alone {
   std::vector<double> errors;     // by group: rms in sigma_ref
 };
 
-struct DatasetRun {
+struct EntropyDatasetRun {
   std::vector<Estimate> estimates[kChoices];
   long not_converged[kChoices] = {};
   std::vector<Alone> alone;
@@ -50,9 +50,9 @@ SegmentSet Choose(Choice choice,
                   int kept,
                   std::uint64_t seed) {
   switch (choice) {
-    case kMost:
+    case kChooseMost:
       return SingleGroup(rig, kept, scores);
-    case kLeast:
+    case kChooseLeast:
       return LeastOfSingleGroup(rig, kept, scores);
     default:
       return RandomSegments(rig, kept, seed, scores);
@@ -62,9 +62,9 @@ SegmentSet Choose(Choice choice,
 void EstimateAll(const Dataset& dataset,
                  const std::vector<SegmentInformation>& scores,
                  const Sizes& sizes,
-                 DatasetRun* run) {
-  for (const Choice choice : {kMost, kLeast, kRandom}) {
-    const int draws = choice == kRandom ? sizes.random_draws : 1;
+                 EntropyDatasetRun* run) {
+  for (const Choice choice : {kChooseMost, kChooseLeast, kChooseRandom}) {
+    const int draws = choice == kChooseRandom ? sizes.random_draws : 1;
     for (int draw = 0; draw < draws; ++draw) {
       const SegmentSet set = Choose(choice,
                                     dataset.rig,
@@ -103,12 +103,12 @@ std::vector<SegmentSet> Updates(Choice choice,
 void Converge(const Dataset& dataset,
               const std::vector<SegmentInformation>& scores,
               int kept,
-              DatasetRun* run) {
+              EntropyDatasetRun* run) {
   const auto count = static_cast<int>(scores.size());
   const CalibrationResult batch =
       CalibrateOn(dataset.rig, dataset.segments(), AllSegments(count));
   const Eigen::VectorXd sigma = batch.covariance.diagonal().cwiseSqrt();
-  for (const Choice choice : {kMost, kLeast, kRandom}) {
+  for (const Choice choice : {kChooseMost, kChooseLeast, kChooseRandom}) {
     Calibration theta = dataset.rig.factory;
     for (const SegmentSet& set : Updates(choice, dataset.rig, scores, kept)) {
       const CalibrationResult result = Calibrate(
@@ -122,7 +122,7 @@ void Converge(const Dataset& dataset,
 
 void CalibrateAlone(const Dataset& dataset,
                     const std::vector<SegmentInformation>& scores,
-                    DatasetRun* run) {
+                    EntropyDatasetRun* run) {
   const Eigen::VectorXd reference = ReferenceSigmas(dataset.rig);
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const CalibrationResult result = Calibrate(dataset.rig,
@@ -145,49 +145,55 @@ void CalibrateAlone(const Dataset& dataset,
   }
 }
 
-void WriteChoices(const std::vector<DatasetRun>& runs, Context* context) {
+void WriteChoices(const std::vector<EntropyDatasetRun>& runs,
+                  Context* context) {
   std::vector<std::pair<std::string, ParameterStatistics>> all;
   ResultTable counts({"choice", "calibrations", "not converged"});
-  for (const Choice choice : {kMost, kLeast, kRandom}) {
+  for (const Choice choice : {kChooseMost, kChooseLeast, kChooseRandom}) {
     std::vector<Estimate> estimates;
     long not_converged = 0;
-    for (const DatasetRun& run : runs) {
+    for (const EntropyDatasetRun& run : runs) {
       estimates.insert(estimates.end(),
                        run.estimates[choice].begin(),
                        run.estimates[choice].end());
       not_converged += run.not_converged[choice];
     }
-    counts.Add(
-        {kNames[choice], static_cast<long>(estimates.size()), not_converged});
-    all.emplace_back(kNames[choice], Summarise(MakeDevice().truth, estimates));
+    counts.Add({kEntropyNames[choice],
+                static_cast<long>(estimates.size()),
+                not_converged});
+    all.emplace_back(kEntropyNames[choice],
+                     Summarise(MakeDevice().truth, estimates));
   }
   context->WriteTable("choices", CompareParameters(MakeDevice().truth, all));
   context->WriteTable("converged", counts);
   const auto error_against_random = [&](Choice choice) {
-    return MedianOf(
-        Ratios(all[choice].second.rms_error, all[kRandom].second.rms_error));
+    return MedianOf(Ratios(all[choice].second.rms_error,
+                           all[kChooseRandom].second.rms_error));
   };
-  context->AtMost(
-      "entropy.error_most_against_random", error_against_random(kMost), 1);
-  context->AtLeast(
-      "entropy.error_least_against_random", error_against_random(kLeast), 1);
+  context->AtMost("entropy.error_most_against_random",
+                  error_against_random(kChooseMost),
+                  1);
+  context->AtLeast("entropy.error_least_against_random",
+                   error_against_random(kChooseLeast),
+                   1);
 }
 
-void PlotConvergence(const std::vector<DatasetRun>& runs, Context* context) {
+void PlotConvergence(const std::vector<EntropyDatasetRun>& runs,
+                     Context* context) {
   Plot plot{.title = "Convergence over the updates of the database",
             .x_label = "update",
             .y_label = "distance to batch, rms [sigma of batch]",
             .log_y = true};
-  for (const Choice choice : {kMost, kRandom, kLeast}) {
-    Series series{.label = kNames[choice]};
+  for (const Choice choice : {kChooseMost, kChooseRandom, kChooseLeast}) {
+    Series series{.label = kEntropyNames[choice]};
     std::size_t longest = 0;
-    for (const DatasetRun& run : runs) {
+    for (const EntropyDatasetRun& run : runs) {
       longest = std::max(longest, run.convergence[choice].size());
     }
     for (std::size_t k = 0; k < longest; ++k) {
       // A database that no longer changes stays where it is.
       std::vector<double> at;
-      for (const DatasetRun& run : runs) {
+      for (const EntropyDatasetRun& run : runs) {
         const std::vector<double>& one = run.convergence[choice];
         if (!one.empty()) at.push_back(one[std::min(k, one.size() - 1)]);
       }
@@ -201,7 +207,7 @@ void PlotConvergence(const std::vector<DatasetRun>& runs, Context* context) {
   context->WritePlot("convergence", plot);
 }
 
-void WriteAlone(const std::vector<DatasetRun>& runs, Context* context) {
+void WriteAlone(const std::vector<EntropyDatasetRun>& runs, Context* context) {
   const std::vector<ParameterGroup> groups = MakeDevice().rig.groups;
   Plot histogram{.title = "Entropies of the segments of all datasets",
                  .x_label = "entropy [nat]",
@@ -220,7 +226,7 @@ void WriteAlone(const std::vector<DatasetRun>& runs, Context* context) {
     std::vector<double> entropies;
     std::vector<double> errors;
     std::vector<double> correlations;
-    for (const DatasetRun& run : runs) {
+    for (const EntropyDatasetRun& run : runs) {
       const std::size_t begin = entropies.size();
       for (const Alone& alone : run.alone) {
         entropies.push_back(alone.entropies[q]);
@@ -262,7 +268,7 @@ void RunEntropy(Context* context) {
              .kept = 2,
              .duration_s = 21};
   }
-  std::vector<DatasetRun> runs(static_cast<std::size_t>(sizes.datasets));
+  std::vector<EntropyDatasetRun> runs(static_cast<std::size_t>(sizes.datasets));
   context->ForEach(sizes.datasets, [&](int i) {
     const Dataset dataset = MakeDataset(i, sizes.duration_s);
     const std::vector<SegmentInformation> scores =

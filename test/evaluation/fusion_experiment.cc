@@ -51,7 +51,7 @@ double SquareDistance(const Calibration& a,
   return square / dof;
 }
 
-struct Outcome {
+struct FusionOutcome {
   std::string dataset;
   double scale = 0;
   long segments = 0;
@@ -65,7 +65,7 @@ struct Outcome {
   double heterogeneity = 0;
 };
 
-Outcome Evaluate(int dataset, double scale, double duration_s) {
+FusionOutcome Evaluate(int dataset, double scale, double duration_s) {
   EvaluatedDevice device = MakeDevice();
   device.rig.factory = PerturbCalibration(
       device.truth, Scaled(scale), 900 + static_cast<std::uint64_t>(dataset));
@@ -90,7 +90,7 @@ Outcome Evaluate(int dataset, double scale, double duration_s) {
     const Eigen::VectorXd d = BoxMinus(a, b).cwiseQuotient(reference)(free);
     return Rms({d.begin(), d.end()});
   };
-  Outcome outcome;
+  FusionOutcome outcome;
   outcome.dataset = data.name;
   outcome.scale = scale;
   outcome.segments = static_cast<long>(stored.size());
@@ -107,7 +107,8 @@ Outcome Evaluate(int dataset, double scale, double duration_s) {
   return outcome;
 }
 
-void PlotDistances(const std::vector<Outcome>& all, const Context& context) {
+void PlotDistances(const std::vector<FusionOutcome>& all,
+                   const Context& context) {
   Plot plot{.title = "The fused estimate, by how far it was linearised",
             .x_label = "reach [sigma_ref]",
             .y_label = "distance [sigma of the full solve]",
@@ -117,7 +118,7 @@ void PlotDistances(const std::vector<Outcome>& all, const Context& context) {
   Series from_full{.label = "fused from full", .style = SeriesStyle::kScatter};
   Series at_truth{.label = "the same, scored at true states",
                   .style = SeriesStyle::kScatter};
-  for (const Outcome& one : all) {
+  for (const FusionOutcome& one : all) {
     from_full.x.push_back(one.reach);
     from_full.y.push_back(one.to_full);
     at_truth.x.push_back(one.reach);
@@ -133,7 +134,7 @@ void RunFusion(Context* context) {
   const int datasets = context->quick() ? 1 : 10;
   const double duration_s = context->quick() ? 16.1 : 80.1;
   const int scales = static_cast<int>(std::size(kScales));
-  std::vector<Outcome> all(datasets * scales);
+  std::vector<FusionOutcome> all(datasets * scales);
   context->ForEach(datasets * scales, [&](int i) {
     all[i] = Evaluate(i % datasets, kScales[i / datasets], duration_s);
     context->Progress(all[i].dataset + " at " + std::to_string(all[i].scale));
@@ -149,7 +150,7 @@ void RunFusion(Context* context) {
                      "NEES / D fused",
                      "NEES / D full",
                      "heterogeneity"});
-  for (const Outcome& one : all) {
+  for (const FusionOutcome& one : all) {
     table.Add({one.scale,
                one.dataset,
                one.segments,
@@ -166,7 +167,7 @@ void RunFusion(Context* context) {
   PlotDistances(all, *context);
   for (const double scale : kScales) {
     std::vector<double> to_full, nees;
-    for (const Outcome& one : all) {
+    for (const FusionOutcome& one : all) {
       if (one.scale != scale) continue;
       to_full.push_back(one.to_full);
       nees.push_back(one.nees);
@@ -179,7 +180,7 @@ void RunFusion(Context* context) {
   // The rule for use: a reach that is short enough.
   double largest = 0;
   long enough = 0;
-  for (const Outcome& one : all) {
+  for (const FusionOutcome& one : all) {
     if (one.reach > kEnoughReach) continue;
     ++enough;
     largest = std::max(largest, one.to_full);

@@ -13,18 +13,19 @@
 namespace selfcal {
 namespace {
 
-enum Kind { kGroups, kSingle, kBatch, kKinds };
-constexpr const char* kNames[] = {"several groups", "single group", "batch"};
+enum GroupKind { kSeveralGroups, kSingleGroup, kWholeBatch, kGroupKinds };
+constexpr const char* kGroupsNames[] = {
+    "several groups", "single group", "batch"};
 
-struct DatasetRun {
+struct GroupsDatasetRun {
   std::string name;
   long segments = 0;
   long kept = 0;
   long common = 0;  // of the kept ones, in both choices
-  Estimate estimates[kKinds];
+  Estimate estimates[kGroupKinds];
 };
 
-DatasetRun RunDataset(int index, double duration_s, int table_size) {
+GroupsDatasetRun RunDataset(int index, double duration_s, int table_size) {
   Dataset dataset = MakeDataset(index, duration_s);
   dataset.rig.table_size = table_size;
   const std::vector<SegmentInformation> scores =
@@ -32,7 +33,7 @@ DatasetRun RunDataset(int index, double duration_s, int table_size) {
   const SegmentSet groups = MostInformative(dataset.rig, scores);
   const SegmentSet single =
       SingleGroup(dataset.rig, static_cast<int>(groups.size()), scores);
-  DatasetRun run;
+  GroupsDatasetRun run;
   run.name = dataset.name;
   run.segments = static_cast<long>(scores.size());
   run.kept = static_cast<long>(groups.size());
@@ -44,9 +45,9 @@ DatasetRun RunDataset(int index, double duration_s, int table_size) {
         CalibrateOn(dataset.rig, dataset.segments(), set);
     return {result.theta, result.covariance.diagonal().cwiseSqrt()};
   };
-  run.estimates[kGroups] = estimate(groups);
-  run.estimates[kSingle] = estimate(single);
-  run.estimates[kBatch] =
+  run.estimates[kSeveralGroups] = estimate(groups);
+  run.estimates[kSingleGroup] = estimate(single);
+  run.estimates[kWholeBatch] =
       estimate(AllSegments(static_cast<int>(scores.size())));
   return run;
 }
@@ -57,25 +58,27 @@ void RunGroups(Context* context) {
   const int count = context->quick() ? 3 : kDatasets;
   const double duration_s = context->quick() ? 45 : kDatasetDuration_s;
   const int table_size = context->quick() ? 2 : 8;
-  std::vector<DatasetRun> runs(static_cast<std::size_t>(count));
+  std::vector<GroupsDatasetRun> runs(static_cast<std::size_t>(count));
   context->ForEach(count, [&](int i) {
     runs[i] = RunDataset(i, duration_s, table_size);
     context->Progress(runs[i].name);
   });
   ResultTable kept({"dataset", "segments", "kept", "in both choices"});
-  for (const DatasetRun& run : runs) {
+  for (const GroupsDatasetRun& run : runs) {
     kept.Add({run.name, run.segments, run.kept, run.common});
   }
   context->WriteTable("kept", kept);
   std::vector<std::pair<std::string, ParameterStatistics>> all;
-  for (const Kind kind : {kGroups, kSingle, kBatch}) {
+  for (const GroupKind kind : {kSeveralGroups, kSingleGroup, kWholeBatch}) {
     std::vector<Estimate> estimates;
-    for (const DatasetRun& run : runs) estimates.push_back(run.estimates[kind]);
-    all.emplace_back(kNames[kind], Summarise(MakeDevice().truth, estimates));
+    for (const GroupsDatasetRun& run : runs)
+      estimates.push_back(run.estimates[kind]);
+    all.emplace_back(kGroupsNames[kind],
+                     Summarise(MakeDevice().truth, estimates));
   }
   context->WriteTable("parameters", CompareParameters(MakeDevice().truth, all));
-  const ParameterStatistics& groups = all[kGroups].second;
-  const ParameterStatistics& single = all[kSingle].second;
+  const ParameterStatistics& groups = all[kSeveralGroups].second;
+  const ParameterStatistics& single = all[kSingleGroup].second;
   context->AtMost("groups.spread_against_single_group",
                   MedianOf(Ratios(groups.spread, single.spread)),
                   1);

@@ -15,17 +15,17 @@ namespace {
 constexpr int kDevices = 24;
 constexpr int kQuickDevices = 2;
 constexpr double kProbability = 0.95;
-constexpr std::uint64_t kFirstSeed = 7001;
+constexpr std::uint64_t kKeyframeRateFirstSeed = 7001;
 
 // Where the solver converged.
-struct Outcome {
+struct KeyframeRateOutcome {
   std::optional<double> nees;
   double worst_sigmas = 0;
 };
 
-Outcome RunDevice(const InertialCase& of, std::uint64_t seed) {
+KeyframeRateOutcome RunDevice(const InertialCase& of, std::uint64_t seed) {
   const InertialOutcome result = CalibrateInertialDevice(of, seed);
-  Outcome outcome;
+  KeyframeRateOutcome outcome;
   if (result.status != CalibrateStatus::kConverged) return outcome;
   outcome.nees = NormalisedSquaredError(result.error, result.covariance).nees;
   outcome.worst_sigmas =
@@ -50,13 +50,14 @@ void RunKeyframeRate(Context* context) {
                      "to",
                      "largest error [sigma]"});
   for (const InertialCase& of : cases) {
-    std::vector<Outcome> outcomes(devices);
+    std::vector<KeyframeRateOutcome> outcomes(devices);
     context->ForEach(devices, [&](int i) {
-      outcomes[i] = RunDevice(of, kFirstSeed + static_cast<std::uint64_t>(i));
+      outcomes[i] =
+          RunDevice(of, kKeyframeRateFirstSeed + static_cast<std::uint64_t>(i));
     });
     std::vector<double> nees;
     double worst = 0;
-    for (const Outcome& outcome : outcomes) {
+    for (const KeyframeRateOutcome& outcome : outcomes) {
       if (!outcome.nees) continue;
       nees.push_back(*outcome.nees);
       worst = std::max(worst, outcome.worst_sigmas);

@@ -19,17 +19,17 @@ namespace {
 // The IMU of the hand-held device is so good against its camera that it takes
 // three minutes to tell the noise of its gyroscope; one that is 30 times worse
 // shows all kinds in half of one.
-struct Device {
+struct NoiseFactorsDevice {
   std::string name, figure;
   double inertial_factor = 1;
   double duration_s = 0;
   std::vector<NoiseKind> kinds;  // that are stated wrongly
 };
 
-std::vector<Device> Devices(bool quick) {
+std::vector<NoiseFactorsDevice> Devices(bool quick) {
   const std::vector<NoiseKind> white = {
       NoiseKind::kPixel, NoiseKind::kGyro, NoiseKind::kAccel};
-  std::vector<Device> devices = {
+  std::vector<NoiseFactorsDevice> devices = {
       {"IMU 30 times worse", "worse_imu", 30, quick ? 8.5 : 24.5, white}};
   if (!quick) {
     devices[0].kinds = AllKinds();
@@ -39,7 +39,7 @@ std::vector<Device> Devices(bool quick) {
 }
 
 // Each kind alone off by 3 either way, and all of them.
-std::vector<Belief> Beliefs(const Device& device) {
+std::vector<Belief> Beliefs(const NoiseFactorsDevice& device) {
   std::vector<Belief> beliefs = {{"right", {}, 1}};
   for (const double off : {1.0 / 3, 3.0}) {
     const std::string way = off < 1 ? "3 times too small" : "3 times too large";
@@ -56,7 +56,7 @@ std::vector<Belief> Beliefs(const Device& device) {
 // Of one dataset: found factors over the truth, by belief and kind.
 using FoundFactors = std::vector<std::vector<NoiseScale>>;
 
-FoundFactors Find(const Device& device, int index) {
+FoundFactors Find(const NoiseFactorsDevice& device, int index) {
   const Dataset dataset = MakeDataset(index,
                                       device.duration_s,
                                       WithNoise(device.inertial_factor),
@@ -90,7 +90,7 @@ bool IsWhite(NoiseKind kind) {
 }
 
 // Of a kind that is stated wrongly by 3, alone or with all others.
-void CheckFound(const Device& device,
+void CheckFound(const NoiseFactorsDevice& device,
                 NoiseKind kind,
                 const std::vector<FoundFactors>& found,
                 Context* context) {
@@ -112,7 +112,7 @@ void CheckFound(const Device& device,
   context->Within(name + "_mean_ratio", Mean(ratios), 0.9, 1.1);
 }
 
-void AddFound(const Device& device,
+void AddFound(const NoiseFactorsDevice& device,
               const std::vector<FoundFactors>& found,
               ResultTable* table) {
   const std::vector<Belief> beliefs = Beliefs(device);
@@ -166,7 +166,7 @@ void FindFactors(Context* context) {
                      "redundancy",
                      "determined in"});
   double worst = 0;
-  for (const Device& device : Devices(context->quick())) {
+  for (const NoiseFactorsDevice& device : Devices(context->quick())) {
     const int datasets =
         context->quick() ? 1 : (device.inertial_factor > 1 ? 4 : 2);
     std::vector<FoundFactors> found(datasets);

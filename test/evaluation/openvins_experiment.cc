@@ -34,7 +34,7 @@ namespace {
 constexpr int kGore = 11;  // of the datasets
 constexpr double kDuration_s = 172.2;
 constexpr int kSeeds = 6;
-constexpr std::uint64_t kFirstSeed = 70'000;
+constexpr std::uint64_t kOpenVinsFirstSeed = 70'000;
 constexpr std::uint64_t kStartStream = 401;
 constexpr double kReadout_s = 0.02;
 
@@ -312,7 +312,7 @@ void ReportSeeds(const std::string& experiment,
   double kept = 0, nees = 0, nees_batch = 0;
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     const Seed& seed = seeds[i];
-    table.Add({static_cast<long>(kFirstSeed + i),
+    table.Add({static_cast<long>(kOpenVinsFirstSeed + i),
                static_cast<long>(seed.sent),
                static_cast<long>(seed.tables.segments),
                seed.tables.nees,
@@ -342,7 +342,8 @@ std::vector<Seed> RunSeeds(Shutter shutter, Context* context) {
   const double duration_s = context->quick() ? 60 : kDuration_s;
   std::vector<Seed> seeds(static_cast<std::size_t>(count));
   context->ForEach(count, [&](int i) {
-    const std::uint64_t seed = kFirstSeed + static_cast<std::uint64_t>(i);
+    const std::uint64_t seed =
+        kOpenVinsFirstSeed + static_cast<std::uint64_t>(i);
     seeds[i] = RunSeed(shutter, seed, duration_s);
     context->Progress(fmt::format("seed {}: NEES {:.1f}, batch {:.1f}",
                                   seed,

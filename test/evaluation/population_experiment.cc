@@ -81,16 +81,16 @@ Eigen::VectorXd DrawDevice(const Truths& truths, std::uint64_t seed) {
   return offset;
 }
 
-struct Device {
+struct PopulationDevice {
   Calibration truth;
   std::vector<MotionSegment> segments;
 };
 
-Device MakeDevice(const Rig& rig,
-                  const Eigen::VectorXd& offset,
-                  double excitation,
-                  std::uint64_t seed) {
-  Device device;
+PopulationDevice MakeDevice(const Rig& rig,
+                            const Eigen::VectorXd& offset,
+                            double excitation,
+                            std::uint64_t seed) {
+  PopulationDevice device;
   device.truth = BoxPlus(rig.factory, offset);
   SimulationOptions options;
   options.seed = seed;
@@ -108,7 +108,7 @@ Device MakeDevice(const Rig& rig,
 
 // Uses the first segments; the result may not have converged.
 CalibrationResult CalibrateDevice(const Rig& rig,
-                                  const Device& device,
+                                  const PopulationDevice& device,
                                   int segments,
                                   const std::optional<ThetaPrior>& prior) {
   CalibrateOptions options = ComparedOptions();
@@ -153,7 +153,9 @@ bool IsRejected(const Rig& rig, const CalibrationResult& result) {
 }
 
 // Calibrates a device as `rig`, on more and more segments.
-Course Follow(const Rig& rig, const Device& device, const Cohort* cohort) {
+Course Follow(const Rig& rig,
+              const PopulationDevice& device,
+              const Cohort* cohort) {
   Course course;
   const Rig reference = CohortRig();
   for (int n = 1; n <= kMostSegments; ++n) {
@@ -230,7 +232,8 @@ void RunPopulation(Context* context) {
   context->ForEach(devices, [&](int i) {
     Eigen::VectorXd offset = DrawDevice(truths, 1000 + i);
     if (i == kBroken) offset = knocked(offset);
-    const Device device = MakeDevice(rig, offset, kVigorous, 1000 + i);
+    const PopulationDevice device =
+        MakeDevice(rig, offset, kVigorous, 1000 + i);
     const CalibrationResult result = CalibrateOn(
         rig, device.segments, AllSegments(kMostSegments), ComparedOptions());
     information[i] =
@@ -265,7 +268,7 @@ void RunPopulation(Context* context) {
   context->ForEach(fresh + foreign + 1, [&](int i) {
     if (i < fresh) {
       const std::uint64_t seed = 5000 + i;
-      const Device device =
+      const PopulationDevice device =
           MakeDevice(rig, DrawDevice(truths, seed), kCalm, seed);
       factory[i] = Follow(rig, device, nullptr);
       prior[i] = Follow(rig, device, &cohort);
@@ -274,7 +277,7 @@ void RunPopulation(Context* context) {
       Truths elsewhere = truths;
       elsewhere.mu += kOtherCohort * truths.sigma;
       const std::uint64_t seed = 7000 + fresh + i;
-      const Device device =
+      const PopulationDevice device =
           MakeDevice(rig, DrawDevice(elsewhere, seed), kCalm, seed);
       other[i - fresh] = Follow(rig, device, &cohort);
       other_as_described[i - fresh] = Follow(described, device, nullptr);

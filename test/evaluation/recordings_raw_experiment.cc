@@ -81,7 +81,7 @@ Rig StartOf(const Rig& truth) {
   return rig;
 }
 
-struct Outcome {
+struct RecordingOutcome {
   CalibrationResult result;
   Eigen::VectorXd error;
   double nees = 0;
@@ -100,7 +100,8 @@ CalibrationResult CalibrateOn(const Rig& rig,
   return Calibrate(rig, rig.factory, segments, options);
 }
 
-std::optional<Outcome> RunOne(const RawRecording& raw, double seconds) {
+std::optional<RecordingOutcome> RunOne(const RawRecording& raw,
+                                       double seconds) {
   const RenderedRecording rendered = Render(raw.kind, seconds, raw.seed);
   Rig rig = StartOf(raw.kind.rig);
   client::RenderedSource source(rendered);
@@ -111,7 +112,7 @@ std::optional<Outcome> RunOne(const RawRecording& raw, double seconds) {
   if (!start.ok()) return std::nullopt;
   rig.factory = start->theta;
   client::Odometry odometry(&source, rig, rig.factory, {.session = raw.name});
-  Outcome outcome;
+  RecordingOutcome outcome;
   std::vector<MotionSegment> segments;
   for (;;) {
     auto next = odometry.Next(rig.factory, 1);
@@ -147,7 +148,7 @@ std::optional<Outcome> RunOne(const RawRecording& raw, double seconds) {
   return outcome;
 }
 
-double WorstInSigmas(const Outcome& outcome) {
+double WorstInSigmas(const RecordingOutcome& outcome) {
   double worst = 0;
   for (int i = 0; i < outcome.error.size(); ++i) {
     const double variance = outcome.result.covariance(i, i);
@@ -158,7 +159,7 @@ double WorstInSigmas(const Outcome& outcome) {
   return worst;
 }
 
-double RmsOf(const Outcome& outcome,
+double RmsOf(const RecordingOutcome& outcome,
              const Rig& rig,
              const std::string& pattern) {
   std::vector<double> errors;
@@ -175,7 +176,7 @@ void RunRecordingsRaw(Context* context) {
   const double seconds = context->quick() ? 10 : 20;
   std::vector<RawRecording> all = AllRecordings();
   if (context->quick()) all.resize(1);
-  std::vector<std::optional<Outcome>> outcomes(all.size());
+  std::vector<std::optional<RecordingOutcome>> outcomes(all.size());
   context->ForEach(static_cast<int>(all.size()), [&](int i) {
     outcomes[i] = RunOne(all[i], seconds);
     context->Progress(all[i].name);
@@ -199,7 +200,7 @@ void RunRecordingsRaw(Context* context) {
       ++failed;
       continue;
     }
-    const Outcome& one = *outcomes[i];
+    const RecordingOutcome& one = *outcomes[i];
     const Rig& rig = all[i].kind.rig;
     table.Add({all[i].name,
                static_cast<long>(one.segments),

@@ -19,9 +19,9 @@
 namespace selfcal {
 namespace {
 
-constexpr int kFirstDevice = 44000;  // seeds of their own
-constexpr int kEach = 10;            // segments of a kind in a row
-constexpr double kReach = 0.9;       // largest, in reference sigmas
+constexpr int kRotationFirstDevice = 44000;  // seeds of their own
+constexpr int kEach = 10;                    // segments of a kind in a row
+constexpr double kReach = 0.9;               // largest, in reference sigmas
 
 // The body turns about a point at a distance from the IMU.
 class Pivot final : public Trajectory {
@@ -168,7 +168,8 @@ CountsOfKinds Run(int index) {
 void RunRotationFalseAlarms(Context* context) {
   const int devices = context->quick() ? 1 : 15;
   std::vector<CountsOfKinds> all(devices);
-  context->ForEach(devices, [&](int i) { all[i] = Run(kFirstDevice + i); });
+  context->ForEach(devices,
+                   [&](int i) { all[i] = Run(kRotationFirstDevice + i); });
   ResultTable table({"motion",
                      "scored at",
                      "segments",

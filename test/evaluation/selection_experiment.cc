@@ -23,11 +23,11 @@ namespace selfcal {
 namespace {
 
 constexpr double kRarePart = 0.15;
-constexpr int kTableSize = 4;
+constexpr int kSelectionTableSize = 4;
 constexpr std::uint64_t kTrackStream = 103;
 
 // A kind of data; several datasets of each.
-struct Scenario {
+struct SelectionScenario {
   std::string name;
   DominantMotion dominant;
   double revisit_fraction = 0.1;
@@ -35,8 +35,8 @@ struct Scenario {
   double track_sigma_px = 0;
 };
 
-const std::vector<Scenario>& Scenarios() {
-  static const std::vector<Scenario> all = {
+const std::vector<SelectionScenario>& Scenarios() {
+  static const std::vector<SelectionScenario> all = {
       {"one axis", DominantMotion::kOneAxis},
       {"calm", DominantMotion::kCalm},
       {"rotation only", DominantMotion::kRotationOnly},
@@ -69,14 +69,14 @@ struct Data {
   std::vector<Candidate> candidates;
 };
 
-Data MakeData(const Scenario& scenario, double duration_s, int index) {
+Data MakeData(const SelectionScenario& scenario, double duration_s, int index) {
   Data data;
   const auto seed = static_cast<std::uint64_t>(index);
   const EvaluatedDevice device = MakeDevice();
   data.truth = device.truth;
   data.rig = device.rig;
   data.rig.factory = PerturbCalibration(device.truth, {}, 500 + seed);
-  data.rig.table_size = kTableSize;
+  data.rig.table_size = kSelectionTableSize;
   SimulationOptions options;
   options.seed = 5000 + seed;
   options.revisit_fraction = scenario.revisit_fraction;
@@ -161,7 +161,7 @@ std::vector<std::pair<std::string, Choice>> MakeChoices(const Data& data,
 }
 
 // What a calibration on a choice comes to.
-struct Outcome {
+struct SelectionOutcome {
   std::string choice;
   int segments = 0;
   double gain_nats = 0;     // against the prior, by the claimed covariance
@@ -170,9 +170,9 @@ struct Outcome {
   bool converged = false;
 };
 
-Outcome Evaluate(const Data& data,
-                 const std::string& name,
-                 const Choice& choice) {
+SelectionOutcome Evaluate(const Data& data,
+                          const std::string& name,
+                          const Choice& choice) {
   std::vector<MotionSegment> chosen;
   for (const int i : choice) chosen.push_back(data.segments[i]);
   const CalibrationResult result =
@@ -185,7 +185,7 @@ Outcome Evaluate(const Data& data,
   const Eigen::VectorXd in_reference =
       error.cwiseQuotient(ReferenceSigmas(data.rig))(free);
   const auto size = static_cast<double>(free.size());
-  Outcome outcome;
+  SelectionOutcome outcome;
   outcome.choice = name;
   outcome.segments = static_cast<int>(choice.size());
   outcome.gain_nats = -normalised.matrixLLT().diagonal().array().log().sum();
@@ -198,15 +198,15 @@ Outcome Evaluate(const Data& data,
 struct DatasetOutcome {
   int scenario = 0;
   int dataset = 0;
-  std::vector<Outcome> outcomes;
+  std::vector<SelectionOutcome> outcomes;
 
   // Means over those of a name.
-  Outcome Mean(const std::string& choice) const {
-    Outcome mean;
+  SelectionOutcome Mean(const std::string& choice) const {
+    SelectionOutcome mean;
     mean.choice = choice;
     mean.converged = true;
     double count = 0;
-    for (const Outcome& outcome : outcomes) {
+    for (const SelectionOutcome& outcome : outcomes) {
       if (outcome.choice != choice) continue;
       ++count;
       mean.segments = outcome.segments;
@@ -224,7 +224,7 @@ struct DatasetOutcome {
 
 std::vector<std::string> Names(const DatasetOutcome& outcome) {
   std::vector<std::string> names;
-  for (const Outcome& one : outcome.outcomes) {
+  for (const SelectionOutcome& one : outcome.outcomes) {
     if (std::find(names.begin(), names.end(), one.choice) == names.end()) {
       names.push_back(one.choice);
     }
@@ -253,8 +253,8 @@ Comparison Compare(const std::vector<DatasetOutcome>& all,
   Comparison comparison;
   for (const DatasetOutcome& one : all) {
     if (scenario != kAllScenarios && one.scenario != scenario) continue;
-    const Outcome here = one.Mean(choice);
-    const Outcome tables = one.Mean(kTables);
+    const SelectionOutcome here = one.Mean(choice);
+    const SelectionOutcome tables = one.Mean(kTables);
     comparison.segments.push_back(here.segments);
     comparison.gains.push_back(here.gain_nats);
     comparison.errors.push_back(here.square_error);
@@ -276,7 +276,7 @@ void WriteTables(const std::vector<DatasetOutcome>& all, Context* context) {
                     "NEES / D",
                     "converged"});
   for (const DatasetOutcome& one : all) {
-    for (const Outcome& outcome : one.outcomes) {
+    for (const SelectionOutcome& outcome : one.outcomes) {
       each.Add({Scenarios()[one.scenario].name,
                 static_cast<long>(one.dataset),
                 outcome.choice,
@@ -354,7 +354,7 @@ void RunSelection(Context* context) {
     DatasetOutcome& one = all[i];
     one.scenario = i / datasets;
     one.dataset = i % datasets;
-    const Scenario& scenario = Scenarios()[one.scenario];
+    const SelectionScenario& scenario = Scenarios()[one.scenario];
     const Data data = MakeData(scenario, duration_s, i);
     for (const auto& [name, choice] : MakeChoices(data, draws)) {
       one.outcomes.push_back(Evaluate(data, name, choice));

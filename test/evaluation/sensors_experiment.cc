@@ -226,7 +226,7 @@ std::vector<Setting> Settings() {
 
 // Errors and claimed sigmas of one calibration, of all components; sigma 0
 // where nothing is estimated.
-struct Run {
+struct SensorsRun {
   Eigen::VectorXd error, sigma;
   double nees = 0;
   // Directions that the data determines. In the others, if there are any, the
@@ -255,9 +255,9 @@ std::vector<MotionSegment> SegmentsOf(const Setting& setting,
 }
 
 // nullopt if it does not converge.
-std::optional<Run> RunOne(const Setting& setting,
-                          std::uint64_t seed,
-                          double duration_s) {
+std::optional<SensorsRun> RunOne(const Setting& setting,
+                                 std::uint64_t seed,
+                                 double duration_s) {
   Rig rig = setting.rig;
   rig.factory = PerturbCalibration(rig.factory, {}, seed);
   if (!IsEstimated(rig.blocks, "imu1.q_JI")) {
@@ -291,7 +291,7 @@ std::optional<Run> RunOne(const Setting& setting,
     }
     if (!rig.factory.cameras[j].time_drift) truth.cameras[j].time_drift.reset();
   }
-  Run run;
+  SensorsRun run;
   run.error = BoxMinus(result.theta, truth);
   run.sigma = result.covariance.diagonal().cwiseSqrt();
   run.nees = NormalisedSquaredError(run.error, result.covariance).nees;
@@ -305,10 +305,10 @@ struct Accuracy {
   double sigma_rms = 0;
 };
 
-Accuracy AccuracyOf(const std::vector<Run>& runs,
+Accuracy AccuracyOf(const std::vector<SensorsRun>& runs,
                     const std::vector<int>& components) {
   std::vector<double> errors, sigmas;
-  for (const Run& run : runs) {
+  for (const SensorsRun& run : runs) {
     for (const int i : components) {
       errors.push_back(run.error(i));
       sigmas.push_back(run.sigma(i));
@@ -318,10 +318,10 @@ Accuracy AccuracyOf(const std::vector<Run>& runs,
 }
 
 // |error| / sigma of all runs and of the estimated ones of the components.
-std::vector<double> Normalised(const std::vector<Run>& runs,
+std::vector<double> Normalised(const std::vector<SensorsRun>& runs,
                                const std::vector<int>& components) {
   std::vector<double> normalised;
-  for (const Run& run : runs) {
+  for (const SensorsRun& run : runs) {
     for (const int i : components) {
       if (run.sigma(i) > 0) {
         normalised.push_back(std::abs(run.error(i)) / run.sigma(i));
@@ -337,15 +337,15 @@ double PartBelow(const std::vector<double>& values, double limit) {
   return count / static_cast<double>(values.size());
 }
 
-int MeanDegrees(const std::vector<Run>& runs) {
+int MeanDegrees(const std::vector<SensorsRun>& runs) {
   double sum = 0;
-  for (const Run& run : runs) sum += run.degrees;
+  for (const SensorsRun& run : runs) sum += run.degrees;
   return static_cast<int>(std::lround(sum / static_cast<double>(runs.size())));
 }
 
-double MeanNees(const std::vector<Run>& runs) {
+double MeanNees(const std::vector<SensorsRun>& runs) {
   double sum = 0;
-  for (const Run& run : runs) sum += run.nees;
+  for (const SensorsRun& run : runs) sum += run.nees;
   return sum / static_cast<double>(runs.size());
 }
 
@@ -389,7 +389,7 @@ ResultTable ConsistencyTable() {
 }
 
 void AddConsistency(const Setting& setting,
-                    const std::vector<Run>& runs,
+                    const std::vector<SensorsRun>& runs,
                     ResultTable* table) {
   std::vector<int> all(runs.front().error.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
@@ -408,7 +408,7 @@ void AddConsistency(const Setting& setting,
 }
 
 void AddAccuracy(const Setting& setting,
-                 const std::vector<Run>& runs,
+                 const std::vector<SensorsRun>& runs,
                  ResultTable* table) {
   const auto components = TangentComponents(setting.rig.factory);
   std::vector<Cell> row = {setting.name};
@@ -443,13 +443,13 @@ void RunSensors(Context* context) {
   ResultTable accuracy = AccuracyTable();
   std::vector<double> offsets, line_delays;
   for (const Setting& setting : Settings()) {
-    std::vector<std::optional<Run>> tried(runs);
+    std::vector<std::optional<SensorsRun>> tried(runs);
     context->ForEach(runs, [&](int i) {
       tried[i] = RunOne(setting, setting.seed + i, duration_s);
     });
     context->Progress(setting.name);
-    std::vector<Run> all;
-    for (const std::optional<Run>& run : tried) {
+    std::vector<SensorsRun> all;
+    for (const std::optional<SensorsRun>& run : tried) {
       if (run) all.push_back(*run);
     }
     context->AtMost("sensors.not_converged_" + setting.name,

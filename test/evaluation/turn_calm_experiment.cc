@@ -19,15 +19,15 @@
 namespace selfcal {
 namespace {
 
-constexpr int kFirstDevice = 41000;  // seeds of their own
-constexpr int kActive = 16;          // segments of the session before
-constexpr int kBefore = 10;          // segments of the next before the turn
+constexpr int kTurnFirstDevice = 41000;  // seeds of their own
+constexpr int kActive = 16;              // segments of the session before
+constexpr int kTurnBefore = 10;          // segments of the next before the turn
 constexpr int kAfter = 24;
 constexpr double kSure = 1e-4;  // of a split, as a run takes it for a change
 
 const DeviceChange kTurn{"turn 0.2 deg", "extrinsics", false, 0.2, 0};
 
-struct Outcome {
+struct TurnOutcome {
   std::optional<int> delay;         // of the test of single segments
   std::optional<int> joined_delay;  // of that of segments joined at their ends
   bool false_alarm = false;
@@ -98,12 +98,12 @@ double SplitProbability(const ChangeDevice& device,
       .split.without_one;
 }
 
-Outcome Run(int index, double excitation) {
+TurnOutcome Run(int index, double excitation) {
   const ChangeDevice device = MakeChangeDevice(
       index,
       *MakeHandheld(kActive * kChangeSegment_s + 0.5, excitation, index));
   const auto before = ScoreSession(
-      device, device.truth, excitation, kBefore, "before", 100'000 + index);
+      device, device.truth, excitation, kTurnBefore, "before", 100'000 + index);
   const auto after = ScoreSession(device,
                                   kTurn.After(device.truth, 1),
                                   excitation,
@@ -111,7 +111,7 @@ Outcome Run(int index, double excitation) {
                                   "after",
                                   200'000 + index);
   const ConsistencyTester tester(device.rig, device.active);
-  Outcome outcome;
+  TurnOutcome outcome;
   outcome.shown = Shown(tester, device, after.segments);
   std::vector<OffsetInformation> newest;
   for (const SegmentInformation& information : before.segments) {
@@ -133,13 +133,15 @@ Outcome Run(int index, double excitation) {
         SplitProbability(device, before.ends, ends.first(i));
     if (probability < kSure) outcome.joined_delay = i;
   }
-  outcome.mixed = SplitProbability(device, before.ends, ends.first(kBefore));
+  outcome.mixed =
+      SplitProbability(device, before.ends, ends.first(kTurnBefore));
   outcome.unmixed = SplitProbability(
-      device, ends.first(kBefore), ends.subspan(kBefore, kBefore));
+      device, ends.first(kTurnBefore), ends.subspan(kTurnBefore, kTurnBefore));
   return outcome;
 }
 
-double Share(const std::vector<Outcome>& outcomes, bool (*is)(const Outcome&)) {
+double Share(const std::vector<TurnOutcome>& outcomes,
+             bool (*is)(const TurnOutcome&)) {
   return static_cast<double>(
              std::count_if(outcomes.begin(), outcomes.end(), is)) /
          static_cast<double>(outcomes.size());
@@ -151,10 +153,11 @@ void RunTurnCalm(Context* context) {
   const std::vector<double> excitations = {0.1, 0.2, 0.3};
   const int devices = context->quick() ? 1 : 8;
   const auto count = static_cast<int>(excitations.size());
-  std::vector<std::vector<Outcome>> all(count, std::vector<Outcome>(devices));
+  std::vector<std::vector<TurnOutcome>> all(count,
+                                            std::vector<TurnOutcome>(devices));
   context->ForEach(count * devices, [&](int i) {
     all[i / devices][i % devices] =
-        Run(kFirstDevice + i, excitations[i / devices]);
+        Run(kTurnFirstDevice + i, excitations[i / devices]);
   });
   ResultTable table({"excitation",
                      "devices",
@@ -170,12 +173,12 @@ void RunTurnCalm(Context* context) {
                      "unmixed sets found (1 %)"});
   for (int e = 0; e < count; ++e) {
     std::vector<double> delays, joined_delays, shown;
-    for (const Outcome& outcome : all[e]) {
+    for (const TurnOutcome& outcome : all[e]) {
       delays.push_back(outcome.delay.value_or(kAfter + 1));
       joined_delays.push_back(outcome.joined_delay.value_or(kAfter + 1));
       shown.push_back(std::sqrt(outcome.shown));
     }
-    const auto share = [&](bool (*is)(const Outcome&)) {
+    const auto share = [&](bool (*is)(const TurnOutcome&)) {
       return Share(all[e], is);
     };
     table.Add(

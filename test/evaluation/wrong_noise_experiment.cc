@@ -14,13 +14,13 @@
 namespace selfcal {
 namespace {
 
-struct Scenario {
+struct WrongNoiseScenario {
   std::string name, figure;
   Belief belief;
   double moving_fraction = 0;
 };
 
-std::vector<Scenario> Scenarios() {
+std::vector<WrongNoiseScenario> WrongNoiseScenarios() {
   const std::vector<NoiseKind> inertial = {NoiseKind::kGyro,
                                            NoiseKind::kAccel,
                                            NoiseKind::kGyroBiasWalk,
@@ -39,7 +39,7 @@ std::vector<Scenario> Scenarios() {
   };
 }
 
-struct Run {
+struct WrongNoiseRun {
   double nees = 0;
   double error_sigmas = 0;    // rms over components, in claimed sigmas
   double sigma_ratio = 0;     // claimed, over that of the right noise; median
@@ -48,10 +48,10 @@ struct Run {
   std::vector<NoiseScale> factors;  // over the truth
 };
 
-Run Measure(const Dataset& dataset,
-            const Rig& rig,
-            const CalibrationResult& right,
-            const CalibrationResult& result) {
+WrongNoiseRun Measure(const Dataset& dataset,
+                      const Rig& rig,
+                      const CalibrationResult& right,
+                      const CalibrationResult& result) {
   const std::vector<int> free = FreeComponents(rig);
   const Eigen::VectorXd error = BoxMinus(result.theta, dataset.truth)(free);
   const Eigen::ArrayXd sigmas =
@@ -73,13 +73,13 @@ Run Measure(const Dataset& dataset,
 
 // By scenario.
 struct Runs {
-  std::vector<Run> stated, reweighted;
+  std::vector<WrongNoiseRun> stated, reweighted;
 };
 
 Runs RunScenarios(int index, double duration_s) {
   Runs runs;
   CalibrationResult right;
-  for (const Scenario& scenario : Scenarios()) {
+  for (const WrongNoiseScenario& scenario : WrongNoiseScenarios()) {
     SimulationOptions options = DatasetOptions(index);
     options.moving_fraction = scenario.moving_fraction;
     const Dataset dataset =
@@ -98,19 +98,21 @@ Runs RunScenarios(int index, double duration_s) {
 }
 
 // Of one scenario and way to weight, over datasets.
-struct Summary {
-  std::vector<Run> runs;
+struct WrongNoiseSummary {
+  std::vector<WrongNoiseRun> runs;
 
-  std::vector<double> Each(double Run::*figure) const {
+  std::vector<double> Each(double WrongNoiseRun::*figure) const {
     std::vector<double> values;
-    for (const Run& run : runs) values.push_back(run.*figure);
+    for (const WrongNoiseRun& run : runs) values.push_back(run.*figure);
     return values;
   }
-  double MeanOf(double Run::*figure) const { return Mean(Each(figure)); }
+  double MeanOf(double WrongNoiseRun::*figure) const {
+    return Mean(Each(figure));
+  }
   // NaN where no run has it.
   double MedianFactor(NoiseKind kind) const {
     std::vector<double> values;
-    for (const Run& run : runs) {
+    for (const WrongNoiseRun& run : runs) {
       for (const NoiseScale& factor : run.factors) {
         if (factor.kind == kind) values.push_back(factor.factor);
       }
@@ -122,23 +124,24 @@ struct Summary {
 
 std::vector<Cell> RowOf(const std::string& scenario,
                         bool reweighted,
-                        const Summary& summary) {
-  std::vector<Cell> row = {scenario,
-                           reweighted ? "re-weighted" : "as stated",
-                           summary.MeanOf(&Run::error_ratio),
-                           summary.MeanOf(&Run::sigma_ratio),
-                           summary.MeanOf(&Run::error_sigmas),
-                           Quantile(summary.Each(&Run::largest_sigmas), 1),
-                           summary.MeanOf(&Run::nees)};
+                        const WrongNoiseSummary& summary) {
+  std::vector<Cell> row = {
+      scenario,
+      reweighted ? "re-weighted" : "as stated",
+      summary.MeanOf(&WrongNoiseRun::error_ratio),
+      summary.MeanOf(&WrongNoiseRun::sigma_ratio),
+      summary.MeanOf(&WrongNoiseRun::error_sigmas),
+      Quantile(summary.Each(&WrongNoiseRun::largest_sigmas), 1),
+      summary.MeanOf(&WrongNoiseRun::nees)};
   for (const NoiseKind kind : AllKinds()) {
     row.push_back(summary.MedianFactor(kind));
   }
   return row;
 }
 
-void CheckScenario(const Scenario& scenario,
-                   const Summary& stated,
-                   const Summary& reweighted,
+void CheckScenario(const WrongNoiseScenario& scenario,
+                   const WrongNoiseSummary& stated,
+                   const WrongNoiseSummary& reweighted,
                    Context* context) {
   const int D = static_cast<int>(FreeComponents(MakeDevice().rig).size());
   const auto [low, high] =
@@ -146,17 +149,19 @@ void CheckScenario(const Scenario& scenario,
   const std::string name = "wrong_noise." + scenario.figure;
   if (scenario.moving_fraction > 0) {
     context->AtMost(name + "_error_rms_in_claimed_sigmas",
-                    stated.MeanOf(&Run::error_sigmas),
+                    stated.MeanOf(&WrongNoiseRun::error_sigmas),
                     1.3);
     return;
   }
-  context->Within(
-      name + "_reweighted_nees", reweighted.MeanOf(&Run::nees), low, high);
+  context->Within(name + "_reweighted_nees",
+                  reweighted.MeanOf(&WrongNoiseRun::nees),
+                  low,
+                  high);
   if (scenario.belief.factor == 1) return;
-  context->AtMost(
-      name + "_reweighted_error_over_stated",
-      reweighted.MeanOf(&Run::error_ratio) / stated.MeanOf(&Run::error_ratio),
-      1);
+  context->AtMost(name + "_reweighted_error_over_stated",
+                  reweighted.MeanOf(&WrongNoiseRun::error_ratio) /
+                      stated.MeanOf(&WrongNoiseRun::error_ratio),
+                  1);
 }
 
 void MeasureWrongNoise(Context* context) {
@@ -186,9 +191,9 @@ void MeasureWrongNoise(Context* context) {
             .horizontal = {1},
             .series = {{.label = "as stated", .style = SeriesStyle::kBars},
                        {.label = "re-weighted", .style = SeriesStyle::kBars}}};
-  const std::vector<Scenario> scenarios = Scenarios();
+  const std::vector<WrongNoiseScenario> scenarios = WrongNoiseScenarios();
   for (std::size_t s = 0; s < scenarios.size(); ++s) {
-    Summary stated, reweighted;
+    WrongNoiseSummary stated, reweighted;
     for (const Runs& runs : all) {
       stated.runs.push_back(runs.stated[s]);
       reweighted.runs.push_back(runs.reweighted[s]);
@@ -196,8 +201,8 @@ void MeasureWrongNoise(Context* context) {
     table.Add(RowOf(scenarios[s].name, false, stated));
     table.Add(RowOf(scenarios[s].name, true, reweighted));
     plot.categories.push_back(scenarios[s].name);
-    plot.series[0].y.push_back(stated.MeanOf(&Run::error_sigmas));
-    plot.series[1].y.push_back(reweighted.MeanOf(&Run::error_sigmas));
+    plot.series[0].y.push_back(stated.MeanOf(&WrongNoiseRun::error_sigmas));
+    plot.series[1].y.push_back(reweighted.MeanOf(&WrongNoiseRun::error_sigmas));
     CheckScenario(scenarios[s], stated, reweighted, context);
   }
   context->WriteTable("wrong_noise", table);

@@ -25,7 +25,7 @@ std::optional<Eigen::Vector2d> Turned(const CameraCalibration& camera,
   return turned_px;
 }
 
-Eigen::Vector3d Squares(const Eigen::Vector2d& x) {
+Eigen::Vector3d SecondPowers(const Eigen::Vector2d& x) {
   return {x.x() * x.x(), x.x() * x.y(), x.y() * x.y()};
 }
 
@@ -53,8 +53,8 @@ TEST(CurvatureOfWarp, PredictsWhereARotationTakesAPatch) {
             8 * Eigen::Vector2d(std::cos(0.4 * i), std::sin(0.4 * i));
         const Eigen::Vector2d true_px = *Turned(camera, q, z + x);
         affine_px = std::max(affine_px, (*to + A * x - true_px).norm());
-        bent_px = std::max(bent_px,
-                           (*to + A * x + bend * Squares(x) - true_px).norm());
+        bent_px = std::max(
+            bent_px, (*to + A * x + bend * SecondPowers(x) - true_px).norm());
       }
     }
     // The third order is left.

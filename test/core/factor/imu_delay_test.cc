@@ -7,12 +7,12 @@
 #include "core/factor/preintegration.h"
 #include "core/model/so3.h"
 #include "test/core/factor/analytic_motion.h"
+#include "test/core/factor/gravity.h"
 #include "test/core/factor/random_values.h"
 
 namespace selfcal {
 namespace {
 
-constexpr double kGravity = 9.81;
 constexpr std::int64_t kBegin_ns = 0, kEnd_ns = 100'000'000;
 
 // Moving both ends of an interval earlier adds the motion before its begin and

@@ -8,14 +8,13 @@
 
 #include "core/factor/inertial.h"
 #include "core/model/so3.h"
+#include "test/core/factor/gravity.h"
 #include "test/core/factor/random_values.h"
 
 namespace selfcal {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kGravity = 9.81;
 
 using Transition = Eigen::Matrix<double, 15, Eigen::Dynamic>;
 

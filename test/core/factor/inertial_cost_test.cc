@@ -4,6 +4,7 @@
 #include "core/model/second_imu.h"
 #include "core/model/so3.h"
 #include "test/core/factor/cost_function_checks.h"
+#include "test/core/factor/gravity.h"
 #include "test/core/factor/random_values.h"
 
 namespace selfcal {
@@ -11,8 +12,6 @@ namespace {
 
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-constexpr double kGravity = 9.81;
 
 struct Factor {
   Calibration reference;

@@ -7,6 +7,7 @@
 
 #include "core/model/so3.h"
 #include "test/core/factor/analytic_motion.h"
+#include "test/core/factor/gravity.h"
 #include "test/core/factor/random_values.h"
 #include "test/core/numeric_jacobian.h"
 
@@ -15,8 +16,6 @@ namespace {
 
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-constexpr double kGravity = 9.81;
 
 struct Factor {
   std::vector<ImuSample> samples;

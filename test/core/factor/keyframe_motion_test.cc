@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.83;
+constexpr double kMotionGravity = 9.83;
 constexpr std::int64_t kPeriod_ns = 5'000'000;
 constexpr std::int64_t kKeyframe_ns = 501'700'000;
 
@@ -31,11 +31,11 @@ struct Scene {
     x.b_a = random.Normal3(0.2);
     x.b_g = random.Normal3(0.02);
     samples = motion.Readings(
-        0, 1'000'000'000, kPeriod_ns, imu, x.b_a, x.b_g, kGravity);
+        0, 1'000'000'000, kPeriod_ns, imu, x.b_a, x.b_g, kMotionGravity);
   }
 
   KeyframeMotion Measure(double dt_s) const {
-    return MeasureMotion(samples, x, imu, {}, kGravity, dt_s);
+    return MeasureMotion(samples, x, imu, {}, kMotionGravity, dt_s);
   }
   KeyframeState Truth(double dt_s) const {
     return motion.State(kKeyframe_ns + std::llround(dt_s * 1e9));
@@ -121,7 +121,7 @@ TEST(MeasureMotion, MovesThePoseToEachRowOfARollingShutter) {
       camera.time_offset_s = random.Uniform(-0.03, 0.03);
       camera.line_delay_s = readout_s / camera.height_px;
       const KeyframeMotion motion = MeasureMotion(
-          {scene.samples}, scene.x, scene.imu, {}, kGravity, camera);
+          {scene.samples}, scene.x, scene.imu, {}, kMotionGravity, camera);
       for (const double row_px : {0.0, 100.5, 240.0, 333.0, 479.0}) {
         const double dt_s =
             camera.time_offset_s + *camera.line_delay_s * row_px;
@@ -173,7 +173,7 @@ TEST(MeasureMotion, OfARowAtTheKeyframesTimeIsNone) {
       for (const double off_s : {-1e-9, 1e-9}) {
         camera.time_offset_s = off_s - *camera.line_delay_s * row_px;
         const KeyframeMotion motion = MeasureMotion(
-            {scene.samples}, scene.x, scene.imu, {}, kGravity, camera);
+            {scene.samples}, scene.x, scene.imu, {}, kMotionGravity, camera);
         const ExposurePose pose = MovePose(scene.x.q_GI,
                                            scene.x.p_GI,
                                            motion,
@@ -248,12 +248,13 @@ TEST(MeasureMotion, NoiseAloneIsNoRate) {
   for (int trial = 0; trial < 1000; ++trial) {
     std::vector<ImuSample> samples;
     for (std::int64_t i = 0; i < 40; ++i) {
-      samples.push_back(
-          {i * kPeriod_ns, random.Normal3(sigma), Vector3d(0, 0, kGravity)});
+      samples.push_back({i * kPeriod_ns,
+                         random.Normal3(sigma),
+                         Vector3d(0, 0, kMotionGravity)});
     }
     const KeyframeState x{.t_ns = 101'000'000};
-    measured +=
-        MeasureMotion(samples, x, {}, noise, kGravity, 0).w_I.squaredNorm();
+    measured += MeasureMotion(samples, x, {}, noise, kMotionGravity, 0)
+                    .w_I.squaredNorm();
     // Smoothed over six samples.
     noisy += 3 * sigma * sigma / 6;
   }
@@ -271,8 +272,8 @@ TEST(MeasureMotion, IsTheSameAtAnyHeading) {
     turned.q_GI = turn * turned.q_GI;
     turned.v_GI = turn * turned.v_GI;
     const KeyframeMotion a = scene.Measure(0.02);
-    const KeyframeMotion b =
-        MeasureMotion(scene.samples, turned, scene.imu, {}, kGravity, 0.02);
+    const KeyframeMotion b = MeasureMotion(
+        scene.samples, turned, scene.imu, {}, kMotionGravity, 0.02);
     EXPECT_LT((b.shift_I - a.shift_I).norm(), 1e-12);
     EXPECT_LT((b.v_I - a.v_I).norm(), 1e-12);
     EXPECT_LT((b.w_I - a.w_I).norm(), 1e-12);

@@ -9,15 +9,15 @@
 #include "core/factor/inertial.h"
 #include "core/model/second_imu.h"
 #include "core/model/so3.h"
+#include "test/core/factor/gravity.h"
 #include "test/core/factor/random_values.h"
 
 namespace selfcal {
 namespace {
 
 constexpr int kState = kMaxChainStateSize;
-constexpr double kGravity = 9.81;
 
-using RowMajor =
+using RowMajorMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 struct Case {
@@ -102,10 +102,11 @@ Eigen::MatrixXd FactorRows(const Case& c) {
 // The same information in the rows of a transition: A^-1 (x0 - G z) and H z.
 Eigen::MatrixXd TransitionRows(const ChainTransition& t) {
   const TransitionColumns& at = t.columns;
-  const Eigen::Map<const RowMajor> G(t.G, kState, at.stride);
-  const Eigen::Map<const RowMajor> H(t.H, t.rows, at.stride);
+  const Eigen::Map<const RowMajorMatrix> G(t.G, kState, at.stride);
+  const Eigen::Map<const RowMajorMatrix> H(t.H, t.rows, at.stride);
   const Eigen::MatrixXd A =
-      Eigen::Map<const RowMajor>(t.A, kState, t.noise()).leftCols<kState>();
+      Eigen::Map<const RowMajorMatrix>(t.A, kState, t.noise())
+          .leftCols<kState>();
   const auto in_order = [&](const Eigen::MatrixXd& by_z) {
     Eigen::MatrixXd rows(by_z.rows(), at.link_size + kState + 1);
     rows << by_z.leftCols(at.link_size), by_z.middleCols<6>(at.next_pose),

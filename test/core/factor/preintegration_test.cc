@@ -7,6 +7,7 @@
 #include "core/factor/inertial.h"
 #include "core/model/so3.h"
 #include "test/core/factor/analytic_motion.h"
+#include "test/core/factor/gravity.h"
 #include "test/core/factor/random_values.h"
 #include "test/core/numeric_jacobian.h"
 
@@ -16,8 +17,6 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Vector9d = Eigen::Matrix<double, 9, 1>;
-
-constexpr double kGravity = 9.81;
 
 // The difference of two motions in the tangent order of the nine.
 Vector9d Difference(const Preintegration& a, const Preintegration& b) {

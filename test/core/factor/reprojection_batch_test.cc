@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSigma_px = 0.8;
 // Relative; the kernels use fused multiply-add and a separate arc tangent.
-constexpr double kTolerance = 1e-12;
+constexpr double kBatchTolerance = 1e-12;
 
 std::vector<VectorWidth> Widths() {
   std::vector<VectorWidth> widths;
@@ -27,7 +27,7 @@ std::vector<VectorWidth> Widths() {
 }
 
 // Points in front of a camera and some behind it, in random order.
-struct Scene {
+struct BatchScene {
   KeyframeState keyframe;
   CameraCalibration camera;
   std::vector<double> points;
@@ -49,13 +49,13 @@ struct Scene {
   }
 };
 
-Scene RandomScene(RandomValues& random,
-                  DistortionModel model,
-                  int count,
-                  bool moves,
-                  bool rolling,
-                  bool drifts) {
-  Scene scene;
+BatchScene RandomScene(RandomValues& random,
+                       DistortionModel model,
+                       int count,
+                       bool moves,
+                       bool rolling,
+                       bool drifts) {
+  BatchScene scene;
   scene.keyframe.q_GI = random.Rotation();
   scene.keyframe.p_GI = random.Normal3(5);
   scene.camera = random.Camera(model);
@@ -90,12 +90,12 @@ void ForRandomScenes(unsigned seed, const Check& check) {
   for (const DistortionModel model : DistortionModels()) {
     for (const int count : {1, 2, 3, 7, 8, 9, 50}) {
       for (int kind = 0; kind < 8; ++kind) {
-        const Scene scene = RandomScene(random,
-                                        model,
-                                        count,
-                                        (kind & 1) != 0,
-                                        (kind & 2) != 0,
-                                        (kind & 4) != 0);
+        const BatchScene scene = RandomScene(random,
+                                             model,
+                                             count,
+                                             (kind & 1) != 0,
+                                             (kind & 2) != 0,
+                                             (kind & 4) != 0);
         for (const VectorWidth width : Widths()) {
           SCOPED_TRACE(VectorWidthName(width));
           check(scene, ReprojectionBatch(width), random);
@@ -105,7 +105,7 @@ void ForRandomScenes(unsigned seed, const Check& check) {
   }
 }
 
-bool Evaluate(const Scene& scene,
+bool Evaluate(const BatchScene& scene,
               int i,
               Eigen::Vector2d* r,
               ReprojectionJacobians* J) {
@@ -121,72 +121,74 @@ bool Evaluate(const Scene& scene,
 
 TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
   int behind = 0;
-  ForRandomScenes(1, [&](const Scene& scene, const auto& batch, auto& random) {
-    const ObservationRun run = scene.Run();
-    const auto turn = PoseTurn(run);
-    EXPECT_EQ(turn.has_value(), scene.motion.has_value());
-    const LandmarkRows columns = RowsOf(scene.camera);
-    const int stride = columns.stride();
-    std::vector<double> weights(run.count);
-    for (double& weight : weights) weight = random.Uniform(0, 2);
-    for (const bool weighted : {false, true}) {
-      std::vector<double> rows(2 * (run.count + 7) * stride, 7.0);
-      batch.Linearise(run,
-                      scene.points.data(),
-                      kSigma_px,
-                      weighted ? weights.data() : nullptr,
-                      rows.data());
-      for (int i = 0; i < run.count; ++i) {
-        Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(2, stride);
-        Eigen::Vector2d r(0, 0);
-        ReprojectionJacobians J;
-        if (Evaluate(scene, i, &r, &J)) {
-          // The rows of a rolling shutter have the derivative with respect to
-          // the rotation of one pose of all rows, from which that of the
-          // keyframe follows; the rotation of the camera acts at another.
-          Eigen::Matrix<double, 2, 6> by_exposure;
-          by_exposure << -J.camera.leftCols(3), J.pose.rightCols(3);
-          if (columns.rolling) {
-            by_exposure.leftCols<3>() = J.pose.leftCols<3>();
+  ForRandomScenes(
+      1, [&](const BatchScene& scene, const auto& batch, auto& random) {
+        const ObservationRun run = scene.Run();
+        const auto turn = PoseTurn(run);
+        EXPECT_EQ(turn.has_value(), scene.motion.has_value());
+        const LandmarkRows columns = RowsOf(scene.camera);
+        const int stride = columns.stride();
+        std::vector<double> weights(run.count);
+        for (double& weight : weights) weight = random.Uniform(0, 2);
+        for (const bool weighted : {false, true}) {
+          std::vector<double> rows(2 * (run.count + 7) * stride, 7.0);
+          batch.Linearise(run,
+                          scene.points.data(),
+                          kSigma_px,
+                          weighted ? weights.data() : nullptr,
+                          rows.data());
+          for (int i = 0; i < run.count; ++i) {
+            Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(2, stride);
+            Eigen::Vector2d r(0, 0);
+            ReprojectionJacobians J;
+            if (Evaluate(scene, i, &r, &J)) {
+              // The rows of a rolling shutter have the derivative with respect
+              // to the rotation of one pose of all rows, from which that of the
+              // keyframe follows; the rotation of the camera acts at another.
+              Eigen::Matrix<double, 2, 6> by_exposure;
+              by_exposure << -J.camera.leftCols(3), J.pose.rightCols(3);
+              if (columns.rolling) {
+                by_exposure.leftCols<3>() = J.pose.leftCols<3>();
+              }
+              if (columns.rolling && turn) {
+                by_exposure.leftCols<3>() -=
+                    J.pose.rightCols<3>() * turn->bottomRows<3>();
+                by_exposure.leftCols<3>() *= turn->topRows<3>().transpose();
+              }
+              expected.leftCols(6) = by_exposure;
+              expected.middleCols(kRowsOwn, columns.own()) =
+                  J.camera.rightCols(columns.own());
+              for (int row = 0; row < 2; ++row) {
+                expected(row, columns.residual()) = r[row];
+              }
+              expected *= weighted ? weights[i] : 1 / kSigma_px;
+              const Eigen::MatrixXd by_turn =
+                  turn ? Eigen::MatrixXd(by_exposure * *turn)
+                       : Eigen::MatrixXd(by_exposure.leftCols(3));
+              EXPECT_LE((J.pose.leftCols(3) - by_turn).norm(),
+                        kBatchTolerance * by_turn.norm());
+              // By p_G = X / w.
+              const Eigen::MatrixXd by_p_G =
+                  scene.Point(i)[3] * J.landmark.leftCols(3);
+              EXPECT_LE((by_p_G + J.pose.rightCols(3)).norm(),
+                        kBatchTolerance * by_p_G.norm());
+            } else {
+              ++behind;
+            }
+            const Eigen::Map<
+                const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>>
+                actual(&rows[2 * i * stride], 2, stride);
+            EXPECT_LE((actual - expected).norm(),
+                      kBatchTolerance * expected.norm());
           }
-          if (columns.rolling && turn) {
-            by_exposure.leftCols<3>() -=
-                J.pose.rightCols<3>() * turn->bottomRows<3>();
-            by_exposure.leftCols<3>() *= turn->topRows<3>().transpose();
-          }
-          expected.leftCols(6) = by_exposure;
-          expected.middleCols(kRowsOwn, columns.own()) =
-              J.camera.rightCols(columns.own());
-          for (int row = 0; row < 2; ++row) {
-            expected(row, columns.residual()) = r[row];
-          }
-          expected *= weighted ? weights[i] : 1 / kSigma_px;
-          const Eigen::MatrixXd by_turn =
-              turn ? Eigen::MatrixXd(by_exposure * *turn)
-                   : Eigen::MatrixXd(by_exposure.leftCols(3));
-          EXPECT_LE((J.pose.leftCols(3) - by_turn).norm(),
-                    kTolerance * by_turn.norm());
-          // By p_G = X / w.
-          const Eigen::MatrixXd by_p_G =
-              scene.Point(i)[3] * J.landmark.leftCols(3);
-          EXPECT_LE((by_p_G + J.pose.rightCols(3)).norm(),
-                    kTolerance * by_p_G.norm());
-        } else {
-          ++behind;
         }
-        const Eigen::Map<
-            const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>>
-            actual(&rows[2 * i * stride], 2, stride);
-        EXPECT_LE((actual - expected).norm(), kTolerance * expected.norm());
-      }
-    }
-  });
+      });
   EXPECT_GT(behind, 50);
 }
 
 TEST(ReprojectionBatch, SumsOfLandmarksAreThoseOfTheHuberLoss) {
   constexpr double kHuber = 2;
-  ForRandomScenes(2, [&](const Scene& scene, const auto& batch, auto&) {
+  ForRandomScenes(2, [&](const BatchScene& scene, const auto& batch, auto&) {
     const ObservationRun run = scene.Run();
     std::vector<LandmarkSums> sums(run.count);
     std::vector<double> squares(run.count), again(run.count);
@@ -207,8 +209,9 @@ TEST(ReprojectionBatch, SumsOfLandmarksAreThoseOfTheHuberLoss) {
         for (const double value : sum.values) EXPECT_EQ(value, 0);
         continue;
       }
-      EXPECT_NEAR(squares[i], r.squaredNorm(), kTolerance * r.squaredNorm());
-      EXPECT_NEAR(again[i], r.squaredNorm(), kTolerance * r.squaredNorm());
+      EXPECT_NEAR(
+          squares[i], r.squaredNorm(), kBatchTolerance * r.squaredNorm());
+      EXPECT_NEAR(again[i], r.squaredNorm(), kBatchTolerance * r.squaredNorm());
       const Eigen::Matrix<double, 2, 3> J_l =
           J.landmark.leftCols<3>() / kSigma_px;
       const double e = r.norm() / kSigma_px;
@@ -216,13 +219,13 @@ TEST(ReprojectionBatch, SumsOfLandmarksAreThoseOfTheHuberLoss) {
       const Eigen::Matrix3d H = weight * J_l.transpose() * J_l;
       const Eigen::Vector3d g = weight / kSigma_px * J_l.transpose() * r;
       for (int a = 0; a < 3; ++a) {
-        EXPECT_NEAR(sum.g(a), g(a), kTolerance * g.norm());
+        EXPECT_NEAR(sum.g(a), g(a), kBatchTolerance * g.norm());
         for (int b = 0; b <= a; ++b) {
-          EXPECT_NEAR(sum.H(a, b), H(a, b), kTolerance * H.norm());
+          EXPECT_NEAR(sum.H(a, b), H(a, b), kBatchTolerance * H.norm());
         }
       }
       const double cost = e > kHuber ? kHuber * (2 * e - kHuber) : e * e;
-      EXPECT_NEAR(sum.cost(), cost, kTolerance * cost);
+      EXPECT_NEAR(sum.cost(), cost, kBatchTolerance * cost);
       EXPECT_EQ(sum.projected(), 1);
     }
   });

@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 constexpr double kSigma = 0.8;
 constexpr double kStep = 1e-4;
-constexpr double kTolerance = 1e-8;
+constexpr double kCostTolerance = 1e-8;
 
 // A rig with one camera of each model, and an observation of one of them.
 struct View {
@@ -139,7 +139,7 @@ TEST(ReprojectionCost, JacobiansMatchDifferencesThroughBothManifolds) {
                          BlocksOf(view, view.p_G),
                          {nullptr, manifold, nullptr, nullptr},
                          kStep,
-                         kTolerance);
+                         kCostTolerance);
     const LandmarkAnchor anchor = RandomAnchor(random, view.p_G);
     const auto anchored = MakeReprojectionCost(
         view.reference, view.camera, view.z_px, kSigma, anchor, view.Motion());
@@ -148,7 +148,7 @@ TEST(ReprojectionCost, JacobiansMatchDifferencesThroughBothManifolds) {
                          blocks,
                          {nullptr, manifold, nullptr, nullptr},
                          kStep,
-                         kTolerance);
+                         kCostTolerance);
     ExpectBlocksCanBeLeftOut(*anchored, blocks);
     if (HasFailure()) FAIL() << "trial " << trial;
   }
@@ -172,7 +172,7 @@ TEST(ReprojectionCost, ALandmarkAtInfinityIsAnOrdinaryValue) {
                          BlocksOf(view, landmark),
                          {nullptr, full.get(), nullptr, nullptr},
                          kStep,
-                         kTolerance);
+                         kCostTolerance);
     if (HasFailure()) FAIL() << "trial " << trial;
   }
 }

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::int64_t kPeriod_ns = 5'000'000;
+constexpr std::int64_t kSamplePeriod_ns = 5'000'000;
 
 std::vector<ImuSample> SamplesAt(const std::vector<std::int64_t>& times_ms) {
   std::vector<ImuSample> samples;
@@ -86,7 +86,7 @@ TEST(Sampling, TheCovarianceCoversTheMotionInAGap) {
       std::vector<ImuSample> samples;
       for (const ImuSample& sample : motion.Readings(-400'000'000,
                                                      700'000'000,
-                                                     kPeriod_ns,
+                                                     kSamplePeriod_ns,
                                                      imu,
                                                      Vector3d::Zero(),
                                                      Vector3d::Zero(),

@@ -14,15 +14,15 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 3000;
-constexpr PixelMap kPlane = {{1, 1}, {0, 0}};
+constexpr int kAxialTrials = 3000;
+constexpr PixelMap kAxialPlane = {{1, 1}, {0, 0}};
 // Where coordinates go to infinity, the region ends this early.
 constexpr double kGap = 1e-5;
 
 template <class Model>
 bool IsValid(const Model& model, const Eigen::Vector3d& p_C) {
   Eigen::Vector2d d;
-  return model.template Project<double>(kPlane, p_C, &d, nullptr);
+  return model.template Project<double>(kAxialPlane, p_C, &d, nullptr);
 }
 
 // The region is the cone of the rays whose cosine of the angle from the axis
@@ -46,7 +46,7 @@ void ExpectRegionEndsAt(const Model& model,
 
 TEST(CameraUnified, RegionEndsAtTheClosedForm) {
   RandomValues random(1);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kAxialTrials; ++i) {
     const double xi = random.Uniform(0.01, 3);
     const CameraUnified model(std::array{xi, 0.0, 0.0, 0.0, 0.0});
     ExpectRegionEndsAt(
@@ -56,7 +56,7 @@ TEST(CameraUnified, RegionEndsAtTheClosedForm) {
 
 TEST(CameraUnified, LargestRadiusIsTheClosedForm) {
   RandomValues random(2);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kAxialTrials; ++i) {
     const double xi = random.Uniform(1.01, 3);
     const double largest = 1 / std::sqrt(xi * xi - 1);
     const CameraUnified model(std::array{xi, 0.0, 0.0, 0.0, 0.0});
@@ -70,7 +70,7 @@ TEST(CameraUnified, LargestRadiusIsTheClosedForm) {
 
 TEST(CameraUnified, RegionEndsWhereTheDistortionStopsRising) {
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kAxialTrials; ++i) {
     // sin(theta) / (cos(theta) + 1) is tan(theta / 2); 1 + 3 k1 q is zero.
     const double theta = random.Uniform(0.5, 2.8);
     const double k1 = -1 / (3 * std::pow(std::tan(theta / 2), 2));
@@ -82,7 +82,7 @@ TEST(CameraUnified, RegionEndsWhereTheDistortionStopsRising) {
 
 TEST(CameraExtendedUnified, RegionEndsAtTheClosedForm) {
   RandomValues random(4);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kAxialTrials; ++i) {
     const double alpha = random.Uniform(0.01, 0.99);
     const double beta = random.Uniform(0.3, 3);
     const CameraExtendedUnified model(std::array{alpha, beta});
@@ -98,15 +98,15 @@ TEST(CameraExtendedUnified, RegionEndsAtTheClosedForm) {
 
 TEST(CameraExtendedUnified, IsTheUnifiedModelForAUnitSphere) {
   RandomValues random(5);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kAxialTrials; ++i) {
     const double alpha = random.Uniform(0.01, 0.99);
     const CameraExtendedUnified model(std::array{alpha, 1.0});
     const CameraUnified unified(
         std::array{alpha / (1 - alpha), 0.0, 0.0, 0.0, 0.0});
     const Eigen::Vector3d p_C = 3 * random.Direction();
     Eigen::Vector2d d, u;
-    const bool seen = model.Project<double>(kPlane, p_C, &d, nullptr);
-    ASSERT_EQ(seen, unified.Project<double>(kPlane, p_C, &u, nullptr));
+    const bool seen = model.Project<double>(kAxialPlane, p_C, &d, nullptr);
+    ASSERT_EQ(seen, unified.Project<double>(kAxialPlane, p_C, &u, nullptr));
     if (!seen) continue;
     EXPECT_LT((d - u / (1 - alpha)).norm(), 1e-13 * (1 + d.squaredNorm()));
   }
@@ -114,7 +114,7 @@ TEST(CameraExtendedUnified, IsTheUnifiedModelForAUnitSphere) {
 
 TEST(CameraDoubleSphere, RegionEndsAtTheClosedForm) {
   RandomValues random(6);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kAxialTrials; ++i) {
     const double xi = random.Uniform(-0.9, 0.9);
     const double alpha = random.Uniform(0.01, 0.99);
     const CameraDoubleSphere model(std::array{xi, alpha});
@@ -127,14 +127,14 @@ TEST(CameraDoubleSphere, RegionEndsAtTheClosedForm) {
 
 TEST(CameraDoubleSphere, IsTheUnifiedModelForConcentricSpheres) {
   RandomValues random(7);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kAxialTrials; ++i) {
     const double alpha = random.Uniform(0.01, 0.99);
     const CameraDoubleSphere model(std::array{0.0, alpha});
     const CameraExtendedUnified unified(std::array{alpha, 1.0});
     const Eigen::Vector3d p_C = 3 * random.Direction();
     Eigen::Vector2d d, u;
-    const bool seen = model.Project<double>(kPlane, p_C, &d, nullptr);
-    ASSERT_EQ(seen, unified.Project<double>(kPlane, p_C, &u, nullptr));
+    const bool seen = model.Project<double>(kAxialPlane, p_C, &d, nullptr);
+    ASSERT_EQ(seen, unified.Project<double>(kAxialPlane, p_C, &u, nullptr));
     if (!seen) continue;
     EXPECT_LT((d - u).norm(), 1e-13 * (1 + d.squaredNorm()));
   }

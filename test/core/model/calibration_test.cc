@@ -14,7 +14,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 1000;
+constexpr int kCalibrationTrials = 1000;
 
 TEST(ImuCalibration, MatricesAreUpperTriangularAsDocumented) {
   ImuCalibration imu;
@@ -54,7 +54,7 @@ TEST(Calibration, BoxPlusOfZeroChangesNothing) {
 
 TEST(Calibration, BoxMinusInvertsBoxPlus) {
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCalibrationTrials; ++i) {
     const Calibration theta = random.Theta();
     // Rotations by up to sqrt(3) 1.8 < pi.
     const Eigen::VectorXd delta = random.Vector(TangentSize(theta), 1.8);
@@ -65,7 +65,7 @@ TEST(Calibration, BoxMinusInvertsBoxPlus) {
 
 TEST(Calibration, BoxPlusInvertsBoxMinus) {
   RandomValues random(4);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCalibrationTrials; ++i) {
     const Calibration a = random.Theta();
     const Calibration b = random.Theta();
     const Calibration again = BoxPlus(b, BoxMinus(a, b));

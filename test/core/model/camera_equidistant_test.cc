@@ -11,8 +11,8 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 3000;
-constexpr PixelMap kPlane = {{1, 1}, {0, 0}};
+constexpr int kEquidistantTrials = 3000;
+constexpr PixelMap kEquidistantPlane = {{1, 1}, {0, 0}};
 using Coefficients = std::array<double, 4>;
 
 Eigen::Vector3d AtAngle(double theta, const Eigen::Vector2d& direction) {
@@ -24,12 +24,13 @@ Eigen::Vector3d AtAngle(double theta, const Eigen::Vector2d& direction) {
 bool ProjectRay(const Coefficients& k,
                 const Eigen::Vector3d& ray_C,
                 Eigen::Vector2d* d) {
-  return CameraEquidistant(k).Project<double>(kPlane, ray_C, d, nullptr);
+  return CameraEquidistant(k).Project<double>(
+      kEquidistantPlane, ray_C, d, nullptr);
 }
 
 TEST(CameraEquidistant, IsTheFormulaAtAnyAngle) {
   RandomValues random(1);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kEquidistantTrials; ++i) {
     const Coefficients k = {random.Uniform(0, 0.1),
                             random.Uniform(0, 0.1),
                             random.Uniform(0, 0.1),
@@ -48,7 +49,7 @@ TEST(CameraEquidistant, IsTheFormulaAtAnyAngle) {
 
 TEST(CameraEquidistant, RegionEndsWhereTheProfileStopsRising) {
   RandomValues random(2);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kEquidistantTrials; ++i) {
     // 1 + 3 k1 theta^2 has its zero at `border`.
     const double border = random.Uniform(0.2, 3.1);
     const Coefficients k = {-1 / (3 * border * border), 0, 0, 0};
@@ -69,7 +70,7 @@ TEST(CameraEquidistant, RegionEndsJustBeforeTheBackwardAxis) {
   RandomValues random(4);
   const double border = 2 * std::atan(2000);
   EXPECT_NEAR(border, std::numbers::pi, 1.01e-3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kEquidistantTrials; ++i) {
     const Eigen::Vector2d direction = random.Vector(2, 1).normalized();
     const double gap = std::abs(random.SignedMagnitude(1e-11, 1e-3));
     Eigen::Vector2d d;
@@ -88,7 +89,7 @@ TEST(CameraEquidistant, UnprojectFindsTheAngleOfEveryRisingProfile) {
   RandomValues random(3);
   int checked = 0;
   int beyond = 0;
-  for (int i = 0; i < 2 * kTrials; ++i) {
+  for (int i = 0; i < 2 * kEquidistantTrials; ++i) {
     Coefficients k;  // far rougher than any lens
     const double theta = std::abs(random.SignedMagnitude(1e-12, 3.1));
     const double rough = theta < 1.5 ? 0.6 : 0.02;
@@ -111,7 +112,7 @@ TEST(CameraEquidistant, UnprojectFindsTheAngleOfEveryRisingProfile) {
     ++checked;
     if (theta > std::numbers::pi / 2) ++beyond;
   }
-  EXPECT_GT(checked, kTrials);
+  EXPECT_GT(checked, kEquidistantTrials);
   EXPECT_GT(beyond, 50);
 }
 
@@ -120,8 +121,8 @@ TEST(CameraEquidistant, TheAxisIsItsOwnImage) {
   const CameraEquidistant model(k);
   Eigen::Vector2d d;
   ProjectionParts<double, 4> parts;
-  ASSERT_TRUE(
-      model.Project<double>(kPlane, Eigen::Vector3d(0, 0, 2), &d, &parts));
+  ASSERT_TRUE(model.Project<double>(
+      kEquidistantPlane, Eigen::Vector3d(0, 0, 2), &d, &parts));
   EXPECT_EQ(d, Eigen::Vector2d::Zero());
   EXPECT_EQ(parts.point.leftCols<2>(), Eigen::Matrix2d::Identity() / 2);
   EXPECT_TRUE(parts.point.col(2).isZero(0));

@@ -21,7 +21,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 3000;
+constexpr int kCameraTrials = 3000;
 
 // Returns true for a pinhole with a distortion, which sees no ray at 90 degrees
 // or beyond.
@@ -134,7 +134,7 @@ INSTANTIATE_TEST_SUITE_P(Models,
 
 TEST_P(CameraTest, WithoutDistortionInTheModelOnTheAxisIsAPinhole) {
   RandomValues random(1);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     CameraCalibration camera = random.Camera(GetParam());
     const Eigen::Vector2d u = 1e-5 * random.Vector(2, 1);
     Eigen::Vector2d z_px;
@@ -147,7 +147,7 @@ TEST_P(CameraTest, WithoutDistortionInTheModelOnTheAxisIsAPinhole) {
 
 TEST_P(CameraTest, PixelDoesNotDependOnTheScaleOfThePoint) {
   RandomValues random(2);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     const Eigen::Vector3d p_C = RandomRay(camera, 0.95, &random);
     const double scale = std::abs(random.SignedMagnitude(1e-9, 1e9));
@@ -164,7 +164,7 @@ TEST_P(CameraTest, PixelDoesNotDependOnTheScaleOfThePoint) {
 
 TEST_P(CameraTest, JacobiansAreTheDerivativesAroundTheAxis) {
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     const CameraCalibration camera =
         InNormalisedPlane(random.Camera(GetParam()));
     const double theta = i % 2 == 0
@@ -185,7 +185,7 @@ using Dual = Eigen::AutoDiffScalar<Derivatives>;
 TEST_P(CameraTest, IsTheTextbookFormulaWithItsAutomaticDerivatives) {
   RandomValues random(17);
   int with_border = 0;
-  for (int i = 0; i < 2 * kTrials; ++i) {
+  for (int i = 0; i < 2 * kCameraTrials; ++i) {
     const CameraCalibration camera =
         InNormalisedPlane(random.Camera(GetParam()));
     const Eigen::Vector2d direction = RandomDirection2(&random);
@@ -231,7 +231,7 @@ TEST_P(CameraTest, IsTheTextbookFormulaWithItsAutomaticDerivatives) {
 
 TEST_P(CameraTest, JacobiansInPixelsAreThoseOfThePlaneTimesTheFocalLength) {
   RandomValues random(4);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     const Eigen::Vector3d ray_C = RandomRay(camera, 1 - 1e-9, &random);
     Eigen::Vector2d z_px, d;
@@ -250,7 +250,7 @@ TEST_P(CameraTest, JacobiansInPixelsAreThoseOfThePlaneTimesTheFocalLength) {
 
 TEST_P(CameraTest, JacobiansDoNotChangeThePixelOrTheValidity) {
   RandomValues random(6);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     Eigen::Vector3d p_C = random.Vector(3, 1);
     p_C.z() += 0.6;
@@ -265,7 +265,7 @@ TEST_P(CameraTest, JacobiansDoNotChangeThePixelOrTheValidity) {
 
 TEST_P(CameraTest, UnprojectInvertsProject) {
   RandomValues random(7);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     const Eigen::Vector3d p_C = RandomRay(camera, 0.95, &random);
     Eigen::Vector2d z_px;
@@ -281,7 +281,7 @@ TEST_P(CameraTest, UnprojectInvertsProject) {
 TEST_P(CameraTest, ProjectInvertsUnprojectUpToTheBorder) {
   RandomValues random(8);
   int checked = 0;
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     const Eigen::Vector2d direction = RandomDirection2(&random);
     const double border = BorderAngle(camera, direction);
@@ -303,13 +303,13 @@ TEST_P(CameraTest, ProjectInvertsUnprojectUpToTheBorder) {
     EXPECT_LT((z_px - again_px).norm(), 1e-9 + 5e-15 * jacobians.point.norm())
         << gap << " with " << camera.distortion.transpose();
   }
-  EXPECT_GT(checked, kTrials * 2 / 3);
+  EXPECT_GT(checked, kCameraTrials * 2 / 3);
 }
 
 TEST_P(CameraTest, UnprojectOfAnyPixelIsInvertedOrRefused) {
   RandomValues random(9);
   int unprojected = 0;
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     const Eigen::Vector2d z_px(random.Uniform(-500, 1200),
                                random.Uniform(-500, 1000));
@@ -320,7 +320,7 @@ TEST_P(CameraTest, UnprojectOfAnyPixelIsInvertedOrRefused) {
     ASSERT_TRUE(Project(camera, bearing_C, &again_px, nullptr));
     EXPECT_LT((z_px - again_px).norm(), 1e-8);
   }
-  EXPECT_GT(unprojected, kTrials / 3);
+  EXPECT_GT(unprojected, kCameraTrials / 3);
 }
 
 TEST(Unproject, RefusesPixelsOfRaysThatProjectRefuses) {
@@ -328,7 +328,7 @@ TEST(Unproject, RefusesPixelsOfRaysThatProjectRefuses) {
   RandomValues random(15);
   int unprojected = 0;
   int refused = 0;
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     CameraCalibration camera =
         InNormalisedPlane(random.Camera(DistortionModel::kFov));
     camera.distortion[0] = random.Uniform(0.5, 1.3);
@@ -345,14 +345,14 @@ TEST(Unproject, RefusesPixelsOfRaysThatProjectRefuses) {
       ++refused;
     }
   }
-  EXPECT_GT(unprojected, kTrials / 10);
-  EXPECT_GT(refused, kTrials / 10);
+  EXPECT_GT(unprojected, kCameraTrials / 10);
+  EXPECT_GT(refused, kCameraTrials / 10);
 }
 
 TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefusedOrInverted) {
   RandomValues random(10);
   int seen = 0;
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     Eigen::Vector3d p_C = random.Vector(3, 1);
     p_C.z() = -std::abs(p_C.z());
@@ -373,13 +373,13 @@ TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefusedOrInverted) {
   if (IsPinhole(GetParam())) {
     EXPECT_EQ(seen, 0);
   } else {
-    EXPECT_GT(seen, kTrials / 10);
+    EXPECT_GT(seen, kCameraTrials / 10);
   }
 }
 
 TEST_P(CameraTest, BackwardAxisIsRefused) {
   RandomValues random(16);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kCameraTrials; ++i) {
     Eigen::Vector2d z_px;
     EXPECT_FALSE(Project(
         random.Camera(GetParam()),
@@ -483,7 +483,7 @@ TEST_P(CameraTest, ExtendsTheModelsWithWhoseCoefficientsItsOwnBegin) {
             [](const auto& a, const auto& b) { return a.name == b.name; })) {
       continue;
     }
-    for (int i = 0; i < kTrials; ++i) {
+    for (int i = 0; i < kCameraTrials; ++i) {
       const CameraCalibration camera = random.Camera(other);
       CameraCalibration extended = camera;
       extended.model = GetParam();

@@ -12,7 +12,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 5000;
+constexpr int kFovTrials = 5000;
 using Real = long double;
 
 // The formula as the paper writes it, in more digits: precise for every w and r
@@ -47,7 +47,7 @@ Result Distort(double w, const Eigen::Vector2d& u) {
 
 TEST(DistortionFov, ValueIsExactForEveryOpeningAngleAndRadius) {
   RandomValues random(1);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kFovTrials; ++i) {
     const double w = i % 2 == 0 ? random.SignedMagnitude(1e-15, 3.14)
                                 : random.Uniform(0.5, 3.14);
     const double r = std::abs(random.SignedMagnitude(1e-15, 1e6));
@@ -58,7 +58,7 @@ TEST(DistortionFov, ValueIsExactForEveryOpeningAngleAndRadius) {
 
 TEST(DistortionFov, DerivativeByOpeningAngleHoldsDownToZero) {
   RandomValues random(2);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kFovTrials; ++i) {
     const double w = i % 2 == 0 ? random.SignedMagnitude(1e-12, 3.1)
                                 : random.Uniform(0.5, 3.1);
     const double r = std::abs(random.SignedMagnitude(1e-9, 10));
@@ -75,7 +75,7 @@ TEST(DistortionFov, DerivativeByOpeningAngleHoldsDownToZero) {
 // d(w) = u (1 + w^2 (1/12 - r^2/3) + ...) to fourth order in w.
 TEST(DistortionFov, BehavesAsItsExpansionAboutNoDistortion) {
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kFovTrials; ++i) {
     const double w = random.SignedMagnitude(1e-9, 1e-4);
     const Eigen::Vector2d u = random.Vector(2, 1);
     const double bend = 1.0 / 12 - u.squaredNorm() / 3;
@@ -92,7 +92,7 @@ TEST(DistortionFov, BehavesAsItsExpansionAboutNoDistortion) {
 
 TEST(DistortionFov, IsEvenInTheOpeningAngle) {
   RandomValues random(4);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kFovTrials; ++i) {
     const double w = random.SignedMagnitude(1e-9, 3.1);
     const Eigen::Vector2d u = random.Vector(2, 3);
     const Result plus = Distort(w, u);
@@ -110,7 +110,7 @@ TEST(DistortionFov, IsContinuousAcrossTheSwitchesToTheSeries) {
     EXPECT_LT((a.by_u - b.by_u).norm(), 1e-11 * a.by_u.norm());
     EXPECT_LT((a.by_w - b.by_w).norm(), 1e-10 * a.by_w.norm());
   };
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kFovTrials; ++i) {
     // tan(w/2)/(w/2) switches at w = 0.1.
     const Eigen::Vector2d u = random.Vector(2, 2);
     expect_continuous(Distort(0.1 * (1 - 1e-14), u),
@@ -125,7 +125,7 @@ TEST(DistortionFov, IsContinuousAcrossTheSwitchesToTheSeries) {
 
 TEST(DistortionFov, UndistortInvertsDistortForEveryOpeningAngle) {
   RandomValues random(6);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kFovTrials; ++i) {
     const double w = random.SignedMagnitude(1e-15, 3.1);
     const double r = std::abs(random.SignedMagnitude(1e-15, 3));
     const Eigen::Vector2d u = r * random.Vector(2, 1).normalized();
@@ -140,7 +140,7 @@ TEST(DistortionFov, UndistortInvertsDistortForEveryOpeningAngle) {
 TEST(DistortionFov, UndistortRefusesRadiiThatNoPointHas) {
   Eigen::Vector2d u;
   RandomValues random(7);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kFovTrials; ++i) {
     const double w = random.SignedMagnitude(1e-3, 3.1);
     const std::array<double, 1> k = {w};
     const double limit = std::numbers::pi / 2 / std::abs(w);

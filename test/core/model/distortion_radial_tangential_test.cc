@@ -10,7 +10,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 3000;
+constexpr int kDistortionTrials = 3000;
 using Coefficients = std::array<double, 4>;
 
 bool IsValid(const Coefficients& k, const Eigen::Vector2d& u) {
@@ -35,7 +35,7 @@ TEST(DistortionRadialTangential, IsTheFormula) {
 
 TEST(DistortionRadialTangential, RegionEndsWhereTheProfileStopsRising) {
   RandomValues random(1);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kDistortionTrials; ++i) {
     const double k1 = random.Uniform(-1, -0.05);
     const double border = std::sqrt(-1 / (3 * k1));  // of 1 + 3 k1 r^2
     const Eigen::Vector2d direction = random.Vector(2, 1).normalized();
@@ -59,7 +59,7 @@ TEST(DistortionRadialTangential, RegionEndsWhereTangentialTermsFoldThePlane) {
   // On the x axis d_x = x + 3 p2 x^2 turns round at x = -1 / (6 p2), on the y
   // axis d_y at y = -1 / (6 p1); the radial profile rises everywhere.
   RandomValues random(4);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kDistortionTrials; ++i) {
     const double p = random.Uniform(-0.2, -0.01);
     const double border = -1 / (6 * p);
     for (const double part : {0.1, 0.5, 0.999}) {
@@ -77,7 +77,7 @@ TEST(DistortionRadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
   // What Undistort finds for the image of a point of the region is that point.
   RandomValues random(2);
   int checked = 0;
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kDistortionTrials; ++i) {
     Coefficients k;
     const DistortionVector random_k =
         random.Distortion(DistortionModel::kRadialTangential);
@@ -93,12 +93,12 @@ TEST(DistortionRadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
     EXPECT_LT((again - u).norm(), 1e-11);
     ++checked;
   }
-  EXPECT_GT(checked, kTrials / 3);
+  EXPECT_GT(checked, kDistortionTrials / 3);
 }
 
 TEST(DistortionRadialTangential, UndistortFindsItsWayOverFlatParts) {
   RandomValues random(5);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kDistortionTrials; ++i) {
     // The slope ((q / a - 1)^2 + c) / (1 + c) is small around r^2 = q = a: a
     // full Newton step from there goes far off.
     const double a = random.Uniform(0.1, 2);
@@ -120,7 +120,7 @@ TEST(DistortionRadialTangential, UndistortFindsItsWayOverFlatParts) {
 
 TEST(DistortionRadialTangential, UndistortRefusesRadiiBeyondTheLargest) {
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kDistortionTrials; ++i) {
     const double k1 = random.Uniform(-1, -0.05);
     // r (1 + k1 r^2) at its maximum is 2/3 of the radius there.
     const double largest = 2.0 / 3 * std::sqrt(-1 / (3 * k1));

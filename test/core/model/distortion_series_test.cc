@@ -10,7 +10,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 5000;
+constexpr int kSeriesTrials = 5000;
 using Real = long double;
 
 // Sums term(0) + term(1) + ... until terms are negligible: a reference without
@@ -23,7 +23,7 @@ Real Sum(const std::function<Real(int)>& term) {
 
 TEST(AtanRatio, AgreesWithItsPowerSeries) {
   RandomValues random(1);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kSeriesTrials; ++i) {
     const double q = std::abs(random.SignedMagnitude(1e-30, 0.8));
     const auto sign = [](int n) { return n % 2 == 0 ? 1 : -1; };
     const Real value = Sum([&](int n) -> Real {
@@ -40,7 +40,7 @@ TEST(AtanRatio, AgreesWithItsPowerSeries) {
 
 TEST(AtanRatio, AgreesWithTheArcTangentForLargeArguments) {
   RandomValues random(2);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kSeriesTrials; ++i) {
     const double q = std::abs(random.SignedMagnitude(0.5, 1e40));
     const Real root = std::sqrt(Real(q));
     const Real value = std::atan(root) / root;
@@ -53,7 +53,7 @@ TEST(AtanRatio, AgreesWithTheArcTangentForLargeArguments) {
 
 TEST(TanRatio, AgreesWithTheTangent) {
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kSeriesTrials; ++i) {
     const double x = random.SignedMagnitude(1e-150, 1.57);
     const double expected = static_cast<double>(std::tan(Real(x)) / Real(x));
     EXPECT_NEAR(TanRatio(x).value / expected, 1, 1e-15) << x;
@@ -62,7 +62,7 @@ TEST(TanRatio, AgreesWithTheTangent) {
 
 TEST(TanRatio, HasTheDerivativeOfTheTangentRatio) {
   RandomValues random(4);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kSeriesTrials; ++i) {
     const double x = random.SignedMagnitude(1e-3, 1.57);
     const Real t = std::tan(Real(x));
     const Real expected = (1 + t * t - t / x) / x;
@@ -71,7 +71,7 @@ TEST(TanRatio, HasTheDerivativeOfTheTangentRatio) {
         << x;
   }
   // Below, the leading term is exact to the next one, 4 x^2 / 5 of it.
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kSeriesTrials; ++i) {
     const double x = random.SignedMagnitude(1e-100, 1e-3);
     EXPECT_NEAR(TanRatio(x).derivative / (2 * x / 3), 1 + 0.8 * x * x, 1e-11);
   }

@@ -10,11 +10,10 @@
 #include <vector>
 
 #include "core/model/camera_model.h"
+#include "test/core/model/special_values.h"
 
 namespace selfcal {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 Calibration OneCamera() {
   Calibration theta;

@@ -5,14 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "test/core/model/random_values.h"
+#include "test/core/model/special_values.h"
 
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 5000;
+constexpr int kMonotonicTrials = 5000;
 
 // The smallest value of the slope on [0, q], by brute force.
 double SmallestSlope(const std::array<double, 4>& k, double q) {
@@ -31,7 +31,7 @@ TEST(ProfileRises, AgreesWithTheSmallestSlope) {
   RandomValues random(1);
   int rising = 0;
   int falling = 0;
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kMonotonicTrials; ++i) {
     std::array<double, 4> k;
     for (double& value : k) value = random.Uniform(-1, 1);
     const double q = random.Uniform(0, 2.5);
@@ -41,13 +41,13 @@ TEST(ProfileRises, AgreesWithTheSmallestSlope) {
     EXPECT_EQ(rises, smallest > 0) << smallest;
     ++(rises ? rising : falling);
   }
-  EXPECT_GT(rising, kTrials / 10);
-  EXPECT_GT(falling, kTrials / 10);
+  EXPECT_GT(rising, kMonotonicTrials / 10);
+  EXPECT_GT(falling, kMonotonicTrials / 10);
 }
 
 TEST(ProfileRises, EndsAtTheFirstZeroOfTheSlope) {
   RandomValues random(2);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kMonotonicTrials; ++i) {
     // (1 - q / a) (1 - q / b): zeros at a and b, rising again beyond b.
     const double a = random.Uniform(0.01, 10);
     const double b = a * random.Uniform(1.001, 3);
@@ -62,7 +62,7 @@ TEST(ProfileRises, EndsAtTheFirstZeroOfTheSlope) {
 
 TEST(ProfileRises, DoesNotEndWhereTheSlopeStaysJustAboveZero) {
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kMonotonicTrials; ++i) {
     // ((q / a - 1)^2 + c) / (1 + c) has its minimum c / (1 + c) at a.
     const double a = random.Uniform(0.01, 10);
     const double c = std::abs(random.SignedMagnitude(1e-9, 1));
@@ -89,7 +89,7 @@ std::array<double, N> WithZeros(const std::array<double, N>& zeros) {
 template <std::size_t N>
 void ExpectTheFirstZeroToBeTheEnd(unsigned seed) {
   RandomValues random(seed);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kMonotonicTrials; ++i) {
     std::array<double, N> zeros;
     for (double& zero : zeros) zero = random.Uniform(1, 3);
     const double first = *std::min_element(zeros.begin(), zeros.end());
@@ -108,7 +108,6 @@ TEST(PositiveUpTo, EndsAtTheFirstZeroOfAnyDegree) {
 }
 
 TEST(ProfileRises, IsFalseForWhatIsNotANumber) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(ProfileRises(std::array{kNan, 0.0}, 1.0));
   EXPECT_FALSE(ProfileRises(std::array{0.1, kNan}, 1.0));
   EXPECT_FALSE(ProfileRises(std::array{0.1, 0.1}, kNan));

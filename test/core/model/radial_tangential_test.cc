@@ -10,7 +10,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 3000;
+constexpr int kRadialTangentialTrials = 3000;
 using Polynomial = RadialTangential<RadialPolynomial<3>>;
 using Rational = RadialTangential<RadialRational>;
 
@@ -47,7 +47,7 @@ TEST(RadialTangential, CoefficientsAreInTheOrderOfOpenCv) {
 
 TEST(RadialTangential, RegionOfACubicEndsWhereTheProfileStopsRising) {
   RandomValues random(1);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRadialTangentialTrials; ++i) {
     // The slope is 1 + 7 k3 r^6.
     const double border = random.Uniform(0.3, 2);
     const std::array k = {0.0, 0.0, 0.0, 0.0, -1 / (7 * std::pow(border, 6))};
@@ -66,7 +66,7 @@ TEST(RadialTangential, RegionOfACubicEndsWhereTheProfileStopsRising) {
 
 TEST(RadialTangential, RegionOfARationalEndsWhereTheProfileStopsRising) {
   RandomValues random(2);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRadialTangentialTrials; ++i) {
     // r / (1 + k4 r^2) has its maximum 1 / (2 border) at border = 1 / sqrt(k4).
     const double border = random.Uniform(0.3, 2);
     const std::array k = {
@@ -84,7 +84,7 @@ TEST(RadialTangential, RegionOfARationalEndsWhereTheProfileStopsRising) {
 
 TEST(RadialTangential, RegionOfARationalEndsAtThePole) {
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRadialTangentialTrials; ++i) {
     // r / (1 + k6 r^6) rises up to the pole, and again beyond it.
     const double border = random.Uniform(0.3, 2);
     const std::array k = {
@@ -103,7 +103,7 @@ TEST(RadialTangential, RegionOfARationalEndsAtThePole) {
 
 TEST(RadialTangential, RationalWhoseTermsCancelIsAPinhole) {
   RandomValues random(4);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRadialTangentialTrials; ++i) {
     std::array<double, 8> k = {};
     for (int j = 0; j < 3; ++j) {
       // As large as calibrated ones, without a zero in the image.
@@ -123,7 +123,7 @@ TEST(RadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
   // Undistort finds each point of the region from its image.
   RandomValues random(5);
   int checked = 0;
-  for (int i = 0; i < 3 * kTrials; ++i) {
+  for (int i = 0; i < 3 * kRadialTangentialTrials; ++i) {
     std::array<double, 8> k;
     for (double& value : k) value = random.Uniform(-0.5, 0.5);
     k[2] *= 0.02;
@@ -139,7 +139,7 @@ TEST(RadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
     EXPECT_LT((again - u).norm(), 1e-11);
     ++checked;
   }
-  EXPECT_GT(checked, kTrials / 2);
+  EXPECT_GT(checked, kRadialTangentialTrials / 2);
 }
 
 }  // namespace

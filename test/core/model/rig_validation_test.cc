@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "core/model/rig.h"
 #include "test/core/model/random_values.h"
+#include "test/core/model/special_values.h"
 
 namespace selfcal {
 namespace {
@@ -15,9 +15,6 @@ namespace {
 using testing::ElementsAre;
 using testing::ElementsAreArray;
 using testing::IsEmpty;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Rig ValidRig() {
   RandomValues random(1);
@@ -29,7 +26,8 @@ Rig ValidRig() {
   return rig;
 }
 
-std::vector<std::string> Fields(const std::vector<Violation>& violations) {
+std::vector<std::string> ViolatedFields(
+    const std::vector<Violation>& violations) {
   std::vector<std::string> fields;
   for (const Violation& violation : violations) {
     EXPECT_FALSE(violation.message.empty()) << violation.field;
@@ -38,13 +36,13 @@ std::vector<std::string> Fields(const std::vector<Violation>& violations) {
   return fields;
 }
 
-struct Corruption {
+struct RigCorruption {
   std::string field;
   std::function<void(Rig*)> apply;
 };
 
 // In the order of the fields; each can be applied together with the others.
-std::vector<Corruption> Corruptions() {
+std::vector<RigCorruption> RigCorruptions() {
   return {
       {"id", [](Rig* r) { r->id = "Phone 1"; }},
       {"factory.imu.s_g", [](Rig* r) { r->factory.imu.s_g.y() = 0; }},
@@ -96,25 +94,25 @@ std::vector<Corruption> Corruptions() {
 }
 
 TEST(ValidateRig, ValidRigHasNoViolation) {
-  EXPECT_THAT(Fields(Validate(ValidRig())), IsEmpty());
+  EXPECT_THAT(ViolatedFields(Validate(ValidRig())), IsEmpty());
 }
 
 TEST(ValidateRig, EachCorruptionGivesExactlyItsField) {
-  for (const Corruption& corruption : Corruptions()) {
+  for (const RigCorruption& corruption : RigCorruptions()) {
     Rig rig = ValidRig();
     corruption.apply(&rig);
-    EXPECT_THAT(Fields(Validate(rig)), ElementsAre(corruption.field));
+    EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAre(corruption.field));
   }
 }
 
 TEST(ValidateRig, AllCorruptionsTogetherGiveAllFieldsInOrder) {
   Rig rig = ValidRig();
   std::vector<std::string> expected;
-  for (const Corruption& corruption : Corruptions()) {
+  for (const RigCorruption& corruption : RigCorruptions()) {
     corruption.apply(&rig);
     expected.push_back(corruption.field);
   }
-  EXPECT_THAT(Fields(Validate(rig)), ElementsAreArray(expected));
+  EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAreArray(expected));
 }
 
 TEST(ValidateRig, IdHasTheAlphabetAndLengthOfAResourceName) {
@@ -125,7 +123,7 @@ TEST(ValidateRig, IdHasTheAlphabetAndLengthOfAResourceName) {
                                 std::string("../x"),
                                 std::string("r\xc3\xbc")}) {
     rig.id = id;
-    EXPECT_THAT(Fields(Validate(rig)), ElementsAre("id")) << id;
+    EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAre("id")) << id;
   }
   for (const std::string& id :
        {std::string("a"), std::string(63, 'z'), std::string("0_a-b")}) {
@@ -137,19 +135,19 @@ TEST(ValidateRig, IdHasTheAlphabetAndLengthOfAResourceName) {
 TEST(ValidateRig, NeedsACamera) {
   Rig rig = ValidRig();
   rig.factory.cameras.clear();
-  EXPECT_THAT(Fields(Validate(rig)), ElementsAre("factory.cameras"));
+  EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAre("factory.cameras"));
 }
 
 TEST(ValidateRig, TooManyCamerasAreCountedAndNotInspected) {
   Rig rig = ValidRig();
   rig.factory.cameras.assign(100'000, CameraCalibration());
-  EXPECT_THAT(Fields(Validate(rig)), ElementsAre("factory.cameras"));
+  EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAre("factory.cameras"));
 }
 
 TEST(ValidateRig, EverythingFixedIsRefused) {
   Rig rig = ValidRig();
   rig.fixed = {"*"};
-  EXPECT_THAT(Fields(Validate(rig)),
+  EXPECT_THAT(ViolatedFields(Validate(rig)),
               ElementsAre("groups[0].patterns",
                           "groups[1].patterns",
                           "groups[2].patterns",
@@ -159,7 +157,7 @@ TEST(ValidateRig, EverythingFixedIsRefused) {
 TEST(ValidateRig, GroupThatIsFixedWholeIsRefused) {
   Rig rig = ValidRig();
   rig.fixed = {"imu.*"};
-  EXPECT_THAT(Fields(Validate(rig)), ElementsAre("groups[0].patterns"));
+  EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAre("groups[0].patterns"));
   rig.groups.erase(rig.groups.begin());
   EXPECT_THAT(Validate(rig), IsEmpty());
 }
@@ -180,7 +178,7 @@ TEST(ValidateRig, GroupOfTimeOffsetsThatAreKnownIsRefusedWithAHint) {
   Rig rig = ValidRig();
   rig.groups = DefaultGroups({{"*.time_offset", true}});
   const std::vector<Violation> violations = Validate(rig);
-  ASSERT_THAT(Fields(violations), ElementsAre("groups[3].patterns"));
+  ASSERT_THAT(ViolatedFields(violations), ElementsAre("groups[3].patterns"));
   EXPECT_THAT(violations[0].message,
               testing::HasSubstr("estimate_time_offset"));
   rig.blocks = {{"*.time_offset", true}};
@@ -190,13 +188,13 @@ TEST(ValidateRig, GroupOfTimeOffsetsThatAreKnownIsRefusedWithAHint) {
 TEST(ValidateRig, BlockSettingThatMatchesNothingIsRefused) {
   Rig rig = ValidRig();
   rig.blocks = {{"imu.gyro.scale", false}, {"imu.gyro.scale.x", false}};
-  EXPECT_THAT(Fields(Validate(rig)), ElementsAre("blocks[1].pattern"));
+  EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAre("blocks[1].pattern"));
 }
 
 TEST(ValidateRig, NeedsAGroup) {
   Rig rig = ValidRig();
   rig.groups.clear();
-  EXPECT_THAT(Fields(Validate(rig)), ElementsAre("groups"));
+  EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAre("groups"));
 }
 
 TEST(ValidateCalibration, PathsBeginWithThePrefix) {
@@ -204,15 +202,15 @@ TEST(ValidateCalibration, PathsBeginWithThePrefix) {
   EXPECT_THAT(Validate(theta, "calibration"), IsEmpty());
   theta.imu.s_g.x() = kNan;
   theta.cameras[2].f.y() = 0;
-  EXPECT_THAT(Fields(Validate(theta, "calibration")),
+  EXPECT_THAT(ViolatedFields(Validate(theta, "calibration")),
               ElementsAre("calibration.imu.s_g", "calibration.cameras[2].f"));
-  EXPECT_THAT(Fields(Validate(theta, "")),
+  EXPECT_THAT(ViolatedFields(Validate(theta, "")),
               ElementsAre("imu.s_g", "cameras[2].f"));
 }
 
 // What no device has, and arithmetic does not survive.
 TEST(ValidateRig, ImplausibleValuesAreNamed) {
-  const std::vector<Corruption> implausible = {
+  const std::vector<RigCorruption> implausible = {
       {"imu_noise.gyro_noise_density",
        [](Rig* r) { r->imu_noise.gyro_noise_density = 1e-300; }},
       {"imu_noise.accel_noise_density",
@@ -228,10 +226,10 @@ TEST(ValidateRig, ImplausibleValuesAreNamed) {
       {"prior_sigmas[0].value",
        [](Rig* r) { r->prior_sigmas[0].value = 1e-300; }},
   };
-  for (const Corruption& corruption : implausible) {
+  for (const RigCorruption& corruption : implausible) {
     Rig rig = ValidRig();
     corruption.apply(&rig);
-    EXPECT_THAT(Fields(Validate(rig)), ElementsAre(corruption.field));
+    EXPECT_THAT(ViolatedFields(Validate(rig)), ElementsAre(corruption.field));
   }
 }
 

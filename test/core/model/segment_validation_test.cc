@@ -11,6 +11,7 @@
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
 #include "test/core/model/random_values.h"
+#include "test/core/model/special_values.h"
 
 namespace selfcal {
 namespace {
@@ -21,8 +22,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::int64_t kMillisecond_ns = 1'000'000;
 
 const Calibration& Theta() {

@@ -12,7 +12,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kTrials = 2000;
+constexpr int kRotationTrials = 2000;
 constexpr double kPi = std::numbers::pi;
 
 // Rotation vectors of every length up to `max_angle`: many near zero.
@@ -25,7 +25,7 @@ Eigen::Vector3d RandomPhi(RandomValues* random, double max_angle) {
 
 TEST(Skew, IsTheCrossProduct) {
   RandomValues random(1);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d a = random.Vector(3, 5);
     const Eigen::Vector3d b = random.Vector(3, 5);
     EXPECT_LT((Skew(a) * b - a.cross(b)).norm(), 1e-14);
@@ -34,7 +34,7 @@ TEST(Skew, IsTheCrossProduct) {
 
 TEST(Exp, TurnsAboutTheVectorByItsLength) {
   RandomValues random(2);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d axis = random.Direction();
     const double angle = random.Uniform(-10, 10);
     const Eigen::Matrix3d expected =
@@ -48,7 +48,7 @@ TEST(Exp, TurnsAboutTheVectorByItsLength) {
 TEST(Exp, IsTheMatrixExponentialAcrossTheSeries) {
   // Terms of the exponential series until they vanish: no switch in there.
   RandomValues random(3);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d phi =
         std::abs(random.SignedMagnitude(1e-12, 1)) * random.Direction();
     Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
@@ -63,7 +63,7 @@ TEST(Exp, IsTheMatrixExponentialAcrossTheSeries) {
 
 TEST(Log, InvertsExpBelowPi) {
   RandomValues random(4);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d phi = RandomPhi(&random, kPi - 1e-9);
     EXPECT_LE((Log(Exp(phi)) - phi).norm(), 2e-15 * phi.norm() + 1e-300);
   }
@@ -71,7 +71,7 @@ TEST(Log, InvertsExpBelowPi) {
 
 TEST(Log, KeepsEveryDigitOfTinyRotations) {
   RandomValues random(5);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d phi =
         std::abs(random.SignedMagnitude(1e-300, 1e-3)) * random.Direction();
     EXPECT_LE((Log(Exp(phi)) - phi).stableNorm(), 1e-15 * phi.stableNorm());
@@ -81,7 +81,7 @@ TEST(Log, KeepsEveryDigitOfTinyRotations) {
 
 TEST(Log, IsPreciseNearPi) {
   RandomValues random(6);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const double angle = kPi - std::abs(random.SignedMagnitude(1e-15, 1e-2));
     const Eigen::Vector3d phi = angle * random.Direction();
     EXPECT_LT((Log(Exp(phi)) - phi).norm(), 4e-15) << angle;
@@ -90,7 +90,7 @@ TEST(Log, IsPreciseNearPi) {
 
 TEST(Log, TakesTheShorterWay) {
   RandomValues random(7);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d axis = random.Direction();
     const double angle = random.Uniform(kPi, 2 * kPi);
     const Eigen::Vector3d phi = Log(Exp(angle * axis));
@@ -101,7 +101,7 @@ TEST(Log, TakesTheShorterWay) {
 
 TEST(Log, IsTheSameForBothSignsOfTheQuaternion) {
   RandomValues random(8);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     Eigen::Quaterniond q = random.Rotation();
     if (i % 4 == 0) {  // by exactly pi
       q.w() = 0;
@@ -114,7 +114,7 @@ TEST(Log, IsTheSameForBothSignsOfTheQuaternion) {
 
 TEST(RightJacobian, IsTheDerivativeOfExp) {
   RandomValues random(9);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d phi = RandomPhi(&random, 2 * kPi);
     const Eigen::MatrixXd numeric = NumericJacobian(
         [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
@@ -128,7 +128,7 @@ TEST(RightJacobian, IsTheDerivativeOfExp) {
 
 TEST(RightJacobianInverse, IsTheDerivativeOfLog) {
   RandomValues random(10);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d phi = RandomPhi(&random, kPi - 0.01);
     const Eigen::MatrixXd numeric = NumericJacobian(
         [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
@@ -143,7 +143,7 @@ TEST(RightJacobianInverse, IsTheDerivativeOfLog) {
 
 TEST(RightJacobianInverse, InvertsTheRightJacobianUpToAndAtPi) {
   RandomValues random(11);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d phi = i % 3 == 0
                                     ? Eigen::Vector3d(kPi * random.Direction())
                                     : RandomPhi(&random, kPi);
@@ -156,7 +156,7 @@ TEST(RightJacobianInverse, InvertsTheRightJacobianUpToAndAtPi) {
 
 TEST(So3, IsContinuousAcrossTheSwitchToTheSeries) {
   RandomValues random(12);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d axis = random.Direction();
     const Eigen::Vector3d below = kSeriesAngle * (1 - 4e-15) * axis;
     const Eigen::Vector3d above = kSeriesAngle * (1 + 4e-15) * axis;
@@ -193,7 +193,7 @@ double LaneDifference(const Many& many, int lane, const One& one) {
 TEST(So3, IsTheSameInEachLane) {
   // Short and long rotations beside each other, and signs.
   RandomValues random(13);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d phi[2] = {RandomPhi(&random, kPi),
                                     RandomPhi(&random, 5)};
     const Eigen::Matrix<Two, 3, 1> both = Both(phi[0], phi[1]);
@@ -219,7 +219,7 @@ TEST(So3, IsTheSameInEachLane) {
 
 TEST(So3, OfTinyRotationsEachLaneKeepsEveryDigit) {
   RandomValues random(14);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Vector3d phi[2] = {
         std::abs(random.SignedMagnitude(1e-300, 1e-3)) * random.Direction(),
         Eigen::Vector3d::Zero()};
@@ -231,7 +231,7 @@ TEST(So3, OfTinyRotationsEachLaneKeepsEveryDigit) {
 
 TEST(So3, ByExactlyPiEachLaneTakesTheSameSignAsOne) {
   RandomValues random(15);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kRotationTrials; ++i) {
     const Eigen::Quaterniond one(
         Eigen::Vector4d(random.Direction().homogeneous().cwiseProduct(
                             Eigen::Vector4d(1, i % 3 == 0 ? 0 : 1, 1, 0)))
