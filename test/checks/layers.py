@@ -33,8 +33,7 @@ FOLDERS = (*LAYERS, "test")
 _DECLARATIONS = {"selfcal_module", "selfcal_test"}
 _KEYWORDS = {
     "SOURCES", "LANES", "USES", "PRIVATE_USES", "PROTOS", "IMPORT_DIRS",
-    "LABELS", "TIMEOUT", "NOT_SANITIZED", "UNITY", "APART", "PUBLIC",
-    "PRIVATE", "INTERFACE",
+    "LABELS", "TIMEOUT", "NOT_SANITIZED", "PUBLIC", "PRIVATE", "INTERFACE",
     "TARGET", "LANGUAGE", "GENERATE_EXTENSIONS", "PLUGIN", "PROTOC_OUT_DIR",
 }  # fmt: skip
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"')
