@@ -7,6 +7,7 @@
 #include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
+
 Heterogeneity::Heterogeneity(std::span<const OffsetInformation> segments) {
   for (const OffsetInformation& segment : segments) {
     const SymmetricEigen eigen(segment.Lambda);

@@ -31,8 +31,8 @@ namespace {
 constexpr int kDevices = 60;
 constexpr std::uint64_t kFirstMotion = 20'001;
 constexpr std::uint64_t kFirstNoise = 30'001;
-constexpr int kAllSegmentsTableSize =
-    7;  // a quarter of the segments of three minutes
+// A quarter of the segments of three minutes.
+constexpr int kAllSegmentsTableSize = 7;
 // The long use: a calibration at each of these numbers of segments.
 constexpr double kLongUse_s = 811;
 constexpr int kMilestones[] = {12, 25, 50, 100, 200};

@@ -8,6 +8,7 @@
 #include <regex>
 
 #include "test/client/formats/loaders.h"
+#include "test/client/formats/loss_names.h"
 #include "test/client/formats/predictions.h"
 
 namespace selfcal::client {
@@ -179,12 +180,6 @@ Rig RandomRig(const Expressible& format, RandomValues* random) {
   return rig;
 }
 
-std::vector<std::string> NamesOfLosses(const std::vector<Loss>& losses) {
-  std::vector<std::string> names;
-  for (const Loss& loss : losses) names.push_back(loss.name);
-  return names;
-}
-
 class Export : public testing::TestWithParam<Expressible> {};
 
 TEST_P(Export, TheToolPredictsTheSamePixelsRatesAndTimes) {
@@ -225,7 +220,7 @@ TEST_P(Export, ReadsBackAsItWas) {
         missing.push_back(fmt::format("cam{}.extrinsics", j));
     }
     if (!GetParam().noise) missing.emplace_back("imu_noise");
-    EXPECT_EQ(NamesOfLosses(again->losses), missing);
+    EXPECT_EQ(Names(again->losses), missing);
     if (!GetParam().imu) rig.factory.imu = {};
     for (CameraCalibration& camera : rig.factory.cameras) {
       if (camera.model == Model::kFov) {
@@ -255,7 +250,7 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
   rig.factory.cameras[1].time_drift = 2e-5;
   const auto files = ExportRig(format, rig, rig.factory, {});
   ASSERT_TRUE(files.ok()) << files.status();
-  const std::vector<std::string> names = NamesOfLosses(files->losses);
+  const std::vector<std::string> names = Names(files->losses);
   const auto named = [&](const std::string& name) {
     return std::count(names.begin(), names.end(), name) == 1;
   };
@@ -288,7 +283,7 @@ TEST_P(Export, SlopesAreNamedAndTheValuesAreThoseOfTheReference) {
   rig.factory.cameras[0].f_slope = Eigen::Vector2d(0.02, 0.03);
   const auto files = ExportRig(GetParam().format, rig, rig.factory, {});
   ASSERT_TRUE(files.ok()) << files.status();
-  const std::vector<std::string> names = NamesOfLosses(files->losses);
+  const std::vector<std::string> names = Names(files->losses);
   EXPECT_EQ(std::count(names.begin(), names.end(), "slopes"), 1);
   ASSERT_EQ(files->files.size(), plain->files.size());
   for (std::size_t i = 0; i < files->files.size(); ++i) {
@@ -303,7 +298,7 @@ TEST_P(Export, OptionalBlocksOfTheImuAreWrittenOrNamed) {
   const auto count = [&](const std::string& name) {
     const auto files = ExportRig(format, rig, rig.factory, kOptions);
     EXPECT_TRUE(files.ok()) << files.status();
-    const std::vector<std::string> names = NamesOfLosses(files->losses);
+    const std::vector<std::string> names = Names(files->losses);
     return std::count(names.begin(), names.end(), name);
   };
   rig.factory.imu.gyro_g_sensitivity = random.Vector(9, 1e-3);
@@ -325,7 +320,7 @@ TEST(ExportKalibr, PositionsOfAxesReadBackAndAreSaidToBeInexact) {
   rig.factory.imu.accel_position = random.Vector(9, 0.01);
   const auto files = ExportRig("kalibr", rig, rig.factory, kOptions);
   ASSERT_TRUE(files.ok()) << files.status();
-  EXPECT_THAT(NamesOfLosses(files->losses), Contains("imu.accel.position"));
+  EXPECT_THAT(Names(files->losses), Contains("imu.accel.position"));
   EXPECT_THAT(LoaderFaults("kalibr", files->files), IsEmpty());
   const auto again = ImportRig("kalibr", files->files, kOptions);
   ASSERT_TRUE(again.ok()) << again.status();
@@ -358,16 +353,15 @@ TEST(ExportKalibr, ASecondImuHasAFileOfItsOwn) {
     EXPECT_THAT(LoaderFaults("kalibr", files->files), IsEmpty());
     ASSERT_EQ(files->files.size(), 3u);
     EXPECT_EQ(files->files[2].name, "imu1.yaml");
-    EXPECT_THAT(NamesOfLosses(files->losses), Contains("imu1.T_i_b"));
-    EXPECT_THAT(NamesOfLosses(files->losses), Not(Contains("imu1")));
+    EXPECT_THAT(Names(files->losses), Contains("imu1.T_i_b"));
+    EXPECT_THAT(Names(files->losses), Not(Contains("imu1")));
     const Tool tool = ReadAsTool("kalibr", files->files, kRate_hz);
     ExpectSamePredictions(rig.factory, tool, &random);
     ExpectSameSecondImu(rig.factory, tool, &random);
 
     const auto again = ImportRig("kalibr", files->files, kOptions);
     ASSERT_TRUE(again.ok()) << again.status();
-    EXPECT_EQ(NamesOfLosses(again->losses),
-              std::vector<std::string>{"imu1.T_i_b"});
+    EXPECT_EQ(Names(again->losses), std::vector<std::string>{"imu1.T_i_b"});
     ASSERT_TRUE(SameShape(again->rig.factory, rig.factory));
     const Eigen::VectorXd difference =
         BoxMinus(again->rig.factory, rig.factory);
@@ -461,7 +455,7 @@ TEST_P(Export, RaysBeyond90DegreesAreSaidToBeLostWhereThereIsAPinhole) {
     ASSERT_TRUE(files.ok()) << files.status();
     const bool pinhole = format == "kalibr" || format == "openvins" ||
                          format == "maplab" || format == "camera_info";
-    const auto names = NamesOfLosses(files->losses);
+    const auto names = Names(files->losses);
     EXPECT_EQ(std::count(names.begin(), names.end(), "cam0.distortion"),
               pinhole && f_px == 200.0);
   }
@@ -497,8 +491,7 @@ TEST(Formats, BasaltsOdometryIsNotSaidToApplyATimeOffset) {
   rig.factory.cameras = {random.Camera(Model::kEquidistant)};
   const auto without = ExportRig("basalt", rig, rig.factory, kOptions);
   ASSERT_TRUE(without.ok()) << without.status();
-  EXPECT_THAT(NamesOfLosses(without->losses),
-              Not(Contains("cam_time_offset_ns")));
+  EXPECT_THAT(Names(without->losses), Not(Contains("cam_time_offset_ns")));
   rig.factory.cameras[0].time_offset_s = -0.004;
   const auto files = ExportRig("basalt", rig, rig.factory, kOptions);
   ASSERT_TRUE(files.ok()) << files.status();
@@ -593,11 +586,11 @@ TEST(Formats, KalibrIsNotSaidToReadTheMatricesOfAnImu) {
   rig.factory.cameras = {random.Camera(Model::kEquidistant)};
   const auto nominal = ExportRig("kalibr", rig, rig.factory, kOptions);
   ASSERT_TRUE(nominal.ok()) << nominal.status();
-  EXPECT_THAT(NamesOfLosses(nominal->losses), Not(Contains("imu_matrices")));
+  EXPECT_THAT(Names(nominal->losses), Not(Contains("imu_matrices")));
   rig.factory.imu.s_g.x() = 1.01;
   const auto files = ExportRig("kalibr", rig, rig.factory, kOptions);
   ASSERT_TRUE(files.ok()) << files.status();
-  EXPECT_THAT(NamesOfLosses(files->losses), Contains("imu_matrices"));
+  EXPECT_THAT(Names(files->losses), Contains("imu_matrices"));
 }
 
 TEST(Formats, AllAreTested) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include "test/client/formats/loss_names.h"
 #include "test/client/formats/predictions.h"
 
 namespace selfcal::client {
@@ -258,12 +259,6 @@ std::vector<TextFile> Files(const std::string& format, RandomValues* random) {
 std::vector<std::string> Missing(const std::string& format) {
   if (format != "camera_info") return {};
   return {"cam0.extrinsics", "cam1.extrinsics", "imu_noise"};
-}
-
-std::vector<std::string> Names(const std::vector<Loss>& losses) {
-  std::vector<std::string> names;
-  for (const Loss& loss : losses) names.push_back(loss.name);
-  return names;
 }
 
 class Import : public testing::TestWithParam<const char*> {};

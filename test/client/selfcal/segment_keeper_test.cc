@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "client/selfcal/queue_limits.h"
+#include "test/client/selfcal/no_wait.h"
 #include "test/client/selfcal/test_segments.h"
 #include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
 
-constexpr std::chrono::milliseconds kWithoutWait{0};  // asks without a wait
 using Verdict = Acknowledgement::Verdict;
 using Clock = SegmentKeeper::Clock;
 
@@ -128,7 +128,7 @@ TEST_F(SegmentKeeperTest, FillsTheWindowWithoutASpool) {
     process.Acknowledge();
     process.Send();
   }
-  EXPECT_TRUE(process.queue().WaitUntilDone(kWithoutWait));
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
   EXPECT_EQ(process.queue().statistics().stored, 5u);
 }
 
@@ -152,7 +152,7 @@ TEST_F(SegmentKeeperTest, WritesToTheSpoolWhatTheWindowCannotTake) {
     EXPECT_EQ(process.queue().unacknowledged(),
               static_cast<std::size_t>(19 - i));
   }
-  EXPECT_TRUE(process.queue().WaitUntilDone(kWithoutWait));
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
   EXPECT_EQ(Files(), 0u);
 }
 
@@ -174,7 +174,7 @@ TEST_F(SegmentKeeperTest, KeepsOneEncodedSegmentWhileTheSpoolIsFull) {
     EXPECT_EQ(process.Acknowledge(), i);
     process.Work();
   }
-  EXPECT_TRUE(process.queue().WaitUntilDone(kWithoutWait));
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
 }
 
 TEST_F(SegmentKeeperTest, ReadsNothingBackThatMemoryHasNoRoomFor) {
@@ -197,7 +197,7 @@ TEST_F(SegmentKeeperTest, ReadsNothingBackThatMemoryHasNoRoomFor) {
     EXPECT_EQ(process.Acknowledge(), i);
     process.Work();
   }
-  EXPECT_TRUE(process.queue().WaitUntilDone(kWithoutWait));
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
 }
 
 TEST_F(SegmentKeeperTest, SpoolsWithTheSmallestQueue) {
@@ -216,7 +216,7 @@ TEST_F(SegmentKeeperTest, SpoolsWithTheSmallestQueue) {
     EXPECT_EQ(process.Acknowledge(), i);
     process.Work();
   }
-  EXPECT_TRUE(process.queue().WaitUntilDone(kWithoutWait));
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
 }
 
 TEST_F(SegmentKeeperTest, RefusesWhatNoMessageCanContain) {
@@ -231,7 +231,7 @@ TEST_F(SegmentKeeperTest, RefusesWhatNoMessageCanContain) {
   process.Connect();
   EXPECT_EQ(process.Send(), (std::vector<std::int64_t>{1}));
   process.Acknowledge();
-  EXPECT_TRUE(process.queue().WaitUntilDone(kWithoutWait));
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
 }
 
 TEST_F(SegmentKeeperTest, LeavesEverythingToTheNextProcess) {
@@ -256,7 +256,7 @@ TEST_F(SegmentKeeperTest, LeavesEverythingToTheNextProcess) {
     EXPECT_EQ(process.Acknowledge(), i);
   }
   process.Work();
-  EXPECT_TRUE(process.queue().WaitUntilDone(kWithoutWait));
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
 }
 
 // The SLAM system, the keeper, the sender and the device's owner act in random
@@ -316,7 +316,7 @@ TEST_F(SegmentKeeperTest, DeliversAllOnceAndInOrderInAnyInterleaving) {
       ASSERT_EQ(process->Acknowledge(), acknowledged++);
     }
     process->Work();
-    EXPECT_TRUE(process->queue().WaitUntilDone(kWithoutWait));
+    EXPECT_TRUE(process->queue().WaitUntilDone(kNow));
     EXPECT_EQ(process->queue().statistics().spool_segments, 0u);
     total += accepted;
   }

@@ -5,13 +5,13 @@
 #include <atomic>
 #include <thread>
 
+#include "test/client/selfcal/no_wait.h"
 #include "test/client/selfcal/test_segments.h"
 #include "test/support/eventually.h"
 
 namespace selfcal::client {
 namespace {
 
-constexpr std::chrono::milliseconds kNow{0};  // asks without a wait
 using Verdict = Acknowledgement::Verdict;
 
 // A queue that no thread works on: the tests do the keeper's and the sender's

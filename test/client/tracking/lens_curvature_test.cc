@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/model/so3.h"
+#include "test/client/tracking/second_powers.h"
 #include "test/core/simulation/rigs.h"
 
 namespace selfcal::client {
@@ -23,10 +24,6 @@ std::optional<Eigen::Vector2d> Turned(const CameraCalibration& camera,
     return std::nullopt;
   }
   return turned_px;
-}
-
-Eigen::Vector3d SecondPowers(const Eigen::Vector2d& x) {
-  return {x.x() * x.x(), x.x() * x.y(), x.y() * x.y()};
 }
 
 TEST(CurvatureOfWarp, PredictsWhereARotationTakesAPatch) {

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/model/so3.h"
+#include "test/client/tracking/second_powers.h"
 #include "test/core/simulation/rigs.h"
 
 namespace selfcal::client {
@@ -33,10 +34,6 @@ struct View {
   }
 };
 
-Eigen::Vector3d Squares(const Eigen::Vector2d& x) {
-  return {x.x() * x.x(), x.x() * x.y(), x.y() * x.y()};
-}
-
 // Mean displacement over a patch that a second order leaves [px].
 Eigen::Vector2d MeanLeft(const View& view,
                          const Eigen::Vector2d& z,
@@ -49,7 +46,7 @@ Eigen::Vector2d MeanLeft(const View& view,
     const double angle = 2 * M_PI * i / kPoints;
     const Eigen::Vector2d x =
         6 * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-    sum += *view.Moved(z + x) - to - A * x - order * Squares(x);
+    sum += *view.Moved(z + x) - to - A * x - order * SecondPowers(x);
   }
   return sum / kPoints;
 }

@@ -167,7 +167,7 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
                        : Eigen::MatrixXd(by_exposure.leftCols(3));
               EXPECT_LE((J.pose.leftCols(3) - by_turn).norm(),
                         kBatchTolerance * by_turn.norm());
-              // By p_G = X / w.
+              // The point is p_G = X / w.
               const Eigen::MatrixXd by_p_G =
                   scene.Point(i)[3] * J.landmark.leftCols(3);
               EXPECT_LE((by_p_G + J.pose.rightCols(3)).norm(),
