@@ -16,10 +16,12 @@ namespace selfcal {
 
 Context::Context(const std::filesystem::path& out,
                  const std::string& experiment,
-                 bool quick)
+                 bool quick,
+                 int threads)
     : experiment_(experiment),
       folder_(out / experiment),
       quick_(quick),
+      threads_(threads),
       begin_(std::chrono::steady_clock::now()) {
   std::filesystem::remove_all(folder_);
   std::filesystem::create_directories(folder_);
@@ -46,11 +48,10 @@ void Context::ForEach(int count, const std::function<void(int)>& work) const {
       }
     }
   };
-  std::vector<std::jthread> threads;
-  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
-  for (unsigned i = 1; i < cores; ++i) threads.emplace_back(run);
+  std::vector<std::jthread> others;
+  for (int i = 1; i < threads_; ++i) others.emplace_back(run);
   run();
-  threads.clear();
+  others.clear();
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -24,10 +24,11 @@ struct CheckOptions {
 
 class Context {
  public:
-  // Makes the folder of the experiment, empty.
+  // Makes the folder of the experiment, empty; threads: those of ForEach.
   Context(const std::filesystem::path& out,
           const std::string& experiment,
-          bool quick);
+          bool quick,
+          int threads);
 
   // A few seconds instead of minutes: fewer datasets, shorter ones.
   bool quick() const { return quick_; }
@@ -35,9 +36,9 @@ class Context {
   // A line on stderr, with the time since the experiment began.
   void Progress(const std::string& what) const;
 
-  // Calls work(0) .. work(count - 1), on as many threads as there are cores;
-  // each i may only write what is its own. Not for what is timed. An exception
-  // of a call is thrown again, once the others have ended.
+  // Calls work(0) .. work(count - 1), on the threads of the context; each i may
+  // only write what is its own. Not for what is timed. An exception of a call
+  // is thrown again, once the others have ended.
   void ForEach(int count, const std::function<void(int)>& work) const;
 
   // <name>.csv and <name>.md.
@@ -70,6 +71,7 @@ class Context {
   const std::string experiment_;
   const std::filesystem::path folder_;
   const bool quick_;
+  const int threads_;
   const std::chrono::steady_clock::time_point begin_;
   std::vector<Figure> figures_;
 };

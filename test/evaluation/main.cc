@@ -9,6 +9,7 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "test/evaluation/context.h"
@@ -56,14 +57,15 @@ std::string ReadFile(const std::filesystem::path& path) {
 // has run is not lost.
 int Run(const std::filesystem::path& out,
         const std::vector<Experiment>& experiments,
-        bool quick) {
+        bool quick,
+        int threads) {
   std::filesystem::create_directories(out);
   const std::filesystem::path summary = out / "summary.json";
   int failed = 0;
   int missed = 0;
   for (const Experiment& experiment : experiments) {
     try {
-      Context context(out, experiment.name, quick);
+      Context context(out, experiment.name, quick, threads);
       context.Progress("begins: " + experiment.about);
       experiment.run(&context);
       context.Progress("done");
@@ -101,10 +103,14 @@ int main(int argc, char** argv) {
   std::vector<std::string> only;
   bool quick = false;
   bool list = false;
+  int threads =
+      static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   app.add_option("--out", out, "Folder for the results");
   app.add_option("--only", only, "Experiments, separated by commas")
       ->delimiter(',');
   app.add_flag("--quick", quick, "Seconds instead of minutes for each");
+  app.add_option("--threads", threads, "Of an experiment; as many as cores")
+      ->check(CLI::PositiveNumber);
   app.add_flag("--list", list, "Names of the experiments");
   CLI11_PARSE(app, argc, argv);
   if (list) return selfcal::List();
@@ -114,5 +120,5 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "--out DIR is missing\n");
     return 1;
   }
-  return selfcal::Run(out, experiments, quick);
+  return selfcal::Run(out, experiments, quick, threads);
 }
