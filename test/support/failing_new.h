@@ -35,6 +35,12 @@ bool Fails(int allocation, const Call& call) {
 
 }  // namespace selfcal
 
+// Where g++ inlines one of a pair alone, it warns that they do not match.
+[[gnu::noinline]] void operator delete(void* memory) noexcept;
+[[gnu::noinline]] void operator delete[](void* memory) noexcept;
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept;
+[[gnu::noinline]] void operator delete[](void* memory, std::size_t) noexcept;
+
 void* operator new(std::size_t size) { return selfcal::Allocate(size); }
 void* operator new[](std::size_t size) { return selfcal::Allocate(size); }
 void operator delete(void* memory) noexcept { std::free(memory); }
