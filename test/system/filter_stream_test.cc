@@ -39,6 +39,7 @@ SimulatedDevice MakeDevice() {
   SimulatedDevice device;
   device.rig = HandheldRig("filter");
   device.rig.factory.cameras[0].time_offset_s = kTimeOffset_s;
+  device.rig.min_gain_nats = 1e9;  // of no segment: no run takes the processor
   const Calibration& theta = device.rig.factory;
   SimulationOptions options;
   options.seed = 5;
