@@ -12,7 +12,6 @@ core.
 import csv
 import json
 import math
-import os
 import pathlib
 import shutil
 import subprocess
@@ -59,12 +58,15 @@ def check_table(path):
 def check_summary(out):
     names = set()
     for entry in load(out / "summary.json"):
-        for key in ("name", "value", "bound", "holds"):
+        for key in ("name", "experiment", "value", "bound", "holds"):
             if key not in entry:
                 fail(f"summary.json: {entry} has no {key}")
         if entry["name"] in names:
             fail(f"summary.json: {entry['name']} is there twice")
         names.add(entry["name"])
+        # So that it is in no other part, either.
+        if not entry["name"].startswith(entry["experiment"] + "."):
+            fail(f"summary.json: {entry['name']} is not named after its folder")
         if not entry["holds"]:
             text = f"{entry['name']}: {entry['value']} misses {entry['bound']}"
             if entry["robust"]:
@@ -81,17 +83,9 @@ def main():
     ).stdout
     names = [line.split()[0] for line in listed.splitlines()]
     names = names[int(part) :: int(parts)]
-    # Threads are the program's own, as in test/evaluate.
-    one_thread = {
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-        "MKL_NUM_THREADS": "1",
-        "BLIS_NUM_THREADS": "1",
-    }
     subprocess.run(
         [program, "--out", out, "--only", ",".join(names)]
         + ["--quick", "--threads", "1"],
-        env=os.environ | one_thread,
         check=True,
     )
     subprocess.run([plot_script, out], check=True)

@@ -102,7 +102,8 @@ class FixturesTest : public SqliteTest {
   }
 
  private:
-  const TempFolder made_;  // a database for each schema version, to be copied
+  // A database for each schema version, to be copied.
+  const TempFolder made_{FolderInMemory()};
 };
 
 TEST_F(FixturesTest, EverySchemaThatWasReleasedOpensWithAllItHeld) {
