@@ -126,8 +126,12 @@ absl::Status Create(const std::string& path,
     SELFCAL_ASSIGN_OR_RETURN(const auto connection,
                              SqliteConnection::Open(unfinished, kOpenFlags));
     SELFCAL_RETURN_IF_ERROR(SetSafetyPragmas(connection.get()));
-    SELFCAL_RETURN_IF_ERROR(
-        connection->Execute(fmt::format("PRAGMA page_size = {}", kPageBytes)));
+    // A file that is not finished is of no use after a crash: it is synced
+    // once, before it gets its name.
+    SELFCAL_RETURN_IF_ERROR(connection->Execute(
+        fmt::format("PRAGMA page_size = {}; PRAGMA synchronous = OFF; "
+                    "PRAGMA journal_mode = MEMORY",
+                    kPageBytes)));
     SELFCAL_RETURN_IF_ERROR(
         ApplyFrom(connection.get(), migrations, 0, time_ns));
   }
