@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -112,7 +113,8 @@ Measured Run(const Options& options,
 }
 
 absl::Status Report(const Options& options, Daemon state, bool with_spool) {
-  const TempFolder scratch;
+  // On the disk, as on a device.
+  const TempFolder scratch(std::filesystem::temp_directory_path());
   Rig rig = HandheldRig("latency");
   ClientOptions client;
   client.rig = rig.id;

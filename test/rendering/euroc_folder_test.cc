@@ -43,7 +43,7 @@ class EurocFolder : public testing::Test {
     for (CameraCalibration& camera : rig.factory.cameras) {
       camera.line_delay_s = 20e-6;
     }
-    folder_ = std::make_unique<TempFolder>(FolderInMemory());
+    folder_ = std::make_unique<TempFolder>();
     recording_ = std::make_unique<RenderedRecording>(
         rig, MakeHandheld(0.3, 1, 1), options);
     WriteEurocFolder(*recording_, recording_->rig().factory, folder_->path());
@@ -155,7 +155,7 @@ TEST_F(EurocFolder, HasTheTrueCalibration) {
 }
 
 TEST(EurocFolderErrors, NamesTheFileThatCannotBeWritten) {
-  const TempFolder folder(FolderInMemory());
+  const TempFolder folder;
   // A file is where a folder should be.
   WriteBytes(folder.path() / "mav0", "");
   const RenderedRecording recording(

@@ -11,10 +11,13 @@
 
 namespace selfcal {
 
-// A folder in memory, where syncs cost nothing, if the machine has one.
-inline std::filesystem::path FolderInMemory() {
+// Where temporary folders are: in $TMPDIR if it is set, else in memory, where
+// syncs cost nothing, if the machine has a folder there with a GiB to spare.
+inline std::filesystem::path ParentOfTempFolders() {
   const std::filesystem::path memory = "/dev/shm";
-  return std::filesystem::exists(memory)
+  std::error_code error;
+  const auto space = std::filesystem::space(memory, error);
+  return !error && space.available >= (1 << 30) && getenv("TMPDIR") == nullptr
              ? memory
              : std::filesystem::temp_directory_path();
 }
@@ -22,8 +25,8 @@ inline std::filesystem::path FolderInMemory() {
 class TempFolder {
  public:
   // Throws std::runtime_error if it cannot be created.
-  explicit TempFolder(const std::filesystem::path& parent =
-                          std::filesystem::temp_directory_path()) {
+  explicit TempFolder(
+      const std::filesystem::path& parent = ParentOfTempFolders()) {
     std::string name = parent / "selfcal-XXXXXX";
     if (mkdtemp(name.data()) == nullptr) {
       throw std::runtime_error("cannot create " + name);

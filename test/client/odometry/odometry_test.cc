@@ -201,7 +201,7 @@ TEST(Odometry, TakesTheTracksOfARecordingWithoutImages) {
                        sample.accel.y(),
                        sample.accel.z());
   }
-  const TempFolder folder(FolderInMemory());
+  const TempFolder folder;
   WriteBytes(folder.File("tracks.csv"), tracks);
   WriteBytes(folder.File("imu.csv"), imu);
   const auto recording = OpenRecording(folder.path(), {});

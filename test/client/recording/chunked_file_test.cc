@@ -55,7 +55,7 @@ class Chunks : public testing::Test {
     return bytes.ok() ? std::string(*bytes) : "";
   }
 
-  TempFolder folder_{FolderInMemory()};
+  TempFolder folder_;
   const std::string path_ = folder_.File("chunks");
   std::vector<FileChunk> chunks_;
 };

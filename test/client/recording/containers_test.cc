@@ -299,7 +299,7 @@ class BrokenBag : public testing::Test {
     return std::string(OpenRecording(path, {}).status().message());
   }
 
-  TempFolder folder_{FolderInMemory()};
+  TempFolder folder_;
 };
 
 TEST_F(BrokenBag, FolderWithoutMetadataHasOneFile) {

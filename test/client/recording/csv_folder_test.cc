@@ -30,7 +30,7 @@ class CsvFolder : public testing::Test {
     return std::string(OpenRecording(folder_.path(), {}).status().message());
   }
 
-  TempFolder folder_{FolderInMemory()};
+  TempFolder folder_;
 };
 
 TEST_F(CsvFolder, HasHeadingsCommentsAndNamesWithoutExtension) {

@@ -50,7 +50,7 @@ class Damaged : public testing::TestWithParam<std::string> {
 
   const std::string whole_ =
       ReadBytes(std::string(SELFCAL_RECORDINGS) + "/" + GetParam());
-  TempFolder folder_{FolderInMemory()};
+  TempFolder folder_;
 };
 
 TEST_P(Damaged, FlippedBitsDoNoHarm) {

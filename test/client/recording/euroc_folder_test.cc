@@ -55,7 +55,7 @@ class EurocReader : public testing::Test {
  protected:
   // One recording for all tests, which copy it before they break it.
   static void SetUpTestSuite() {
-    whole_ = new TempFolder(FolderInMemory());
+    whole_ = new TempFolder();
     rendered_ = new RenderedRecording(StereoRig(), MakeHandheld(0.4, 1, 1), {});
     WriteEurocFolder(*rendered_, rendered_->rig().factory, whole_->path());
   }
@@ -87,7 +87,7 @@ class EurocReader : public testing::Test {
 
   static TempFolder* whole_;
   static RenderedRecording* rendered_;
-  TempFolder copy_{FolderInMemory()};
+  TempFolder copy_;
 };
 
 TempFolder* EurocReader::whole_ = nullptr;

@@ -27,7 +27,7 @@ class PngImage : public testing::Test {
     return DecodePng(ReadBytes(path_));
   }
 
-  TempFolder folder_{FolderInMemory()};
+  TempFolder folder_;
   std::string path_ = folder_.File("image.png");
 };
 

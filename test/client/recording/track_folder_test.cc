@@ -33,7 +33,7 @@ class TrackFolder : public testing::Test {
     return std::string(OpenRecording(folder_.path(), {}).status().message());
   }
 
-  TempFolder folder_{FolderInMemory()};
+  TempFolder folder_;
 };
 
 TEST_F(TrackFolder, HasThePointsOfEachImage) {

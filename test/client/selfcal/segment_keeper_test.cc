@@ -108,7 +108,7 @@ class SegmentKeeperTest : public ::testing::Test {
   }
 
   // In memory, because the interleavings sync thousands of files.
-  TempFolder folder_{FolderInMemory()};
+  TempFolder folder_;
 };
 
 TEST_F(SegmentKeeperTest, FillsTheWindowWithoutASpool) {

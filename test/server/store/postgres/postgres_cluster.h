@@ -8,6 +8,7 @@
 
 #include <sys/types.h>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -45,7 +46,8 @@ class PostgresCluster {
   pid_t Run(const std::vector<std::string>& command) const;
   std::string Log() const;
 
-  const TempFolder folder_;
+  // Its log is too large for memory.
+  const TempFolder folder_{std::filesystem::temp_directory_path()};
   const std::vector<std::string> settings_;
   const pid_t owner_;  // a fork of it leaves the server alone
   pid_t server_ = 0;   // 0: none runs

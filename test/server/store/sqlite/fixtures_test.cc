@@ -103,7 +103,7 @@ class FixturesTest : public SqliteTest {
 
  private:
   // A database for each schema version, to be copied.
-  const TempFolder made_{FolderInMemory()};
+  const TempFolder made_;
 };
 
 TEST_F(FixturesTest, EverySchemaThatWasReleasedOpensWithAllItHeld) {

@@ -114,7 +114,7 @@ class IoFaultTest : public SqliteTest {
     return Eventually([this] { return store_->GetRig("a").ok(); });
   }
 
-  const TempFolder ready_{FolderInMemory()};
+  const TempFolder ready_;
   FaultVfs vfs_;
 };
 

@@ -33,7 +33,7 @@ class SqliteTest : public ::testing::Test {
   std::string Path() const { return folder_.File("selfcal.db"); }
 
   // In memory: the tests simulate the disk themselves.
-  TempFolder folder_{FolderInMemory()};
+  TempFolder folder_;
   const Rig rig_ = TestRig("a");
   std::unique_ptr<Store> store_;
   std::optional<Domain> domain_;
