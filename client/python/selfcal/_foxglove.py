@@ -78,17 +78,21 @@ def sensors(
     calibration: v1.CalibrationParameters, t_ns: int
 ) -> Iterator[Timed]:
     """Yields the poses of the sensors and the intrinsics of the cameras."""
-    parts = [("A", calibration.imu.q_ai, v1.Vector3())]
+    parts = [("I", "A", calibration.imu.q_ai, v1.Vector3())]
     for number, camera in enumerate(calibration.cameras):
-        parts.append((f"cam{number}", camera.q_ci, camera.p_ci))
-    for frame, q, p in parts:
+        parts.append(("I", f"cam{number}", camera.q_ci, camera.p_ci))
+    if calibration.HasField("imu1"):
+        second = calibration.imu1
+        parts.append(("I", "J", second.q_ji, second.p_ji))
+        parts.append(("J", "A1", second.q_ai, v1.Vector3()))
+    for parent, frame, q, p in parts:
         rotation, translation = _inverse(q, p)
         yield (
             t_ns,
             "/tf",
             FrameTransform_pb2.FrameTransform(
                 timestamp=_stamp(t_ns),
-                parent_frame_id="I",
+                parent_frame_id=parent,
                 child_frame_id=frame,
                 rotation=rotation,
                 translation=translation,
@@ -154,13 +158,15 @@ def keyframes(
         )
 
 
-def imu(samples: segment_pb2.MotionSegment.ImuSamples) -> Iterator[Timed]:
+def imu(
+    samples: segment_pb2.MotionSegment.ImuSamples, topic: str
+) -> Iterator[Timed]:
     for t_ns, gyro, accel in zip(
         samples.t_ns, _triples(samples.gyro), _triples(samples.accel)
     ):
         yield (
             t_ns,
-            "/imu",
+            topic,
             messages.ImuReading(
                 timestamp=_stamp(t_ns),
                 gyro=_contract_vector(gyro),
@@ -238,11 +244,11 @@ _NOMINAL = v1.ImuCalibration(s_g=_ONE, s_a=_ONE)
 
 
 def _corrections(imu: v1.ImuCalibration) -> list[str]:
-    """Returns the names of the values that correct readings, but for q_ai,
-    which is the pose of frame A."""
+    """Returns the names of the values that correct readings, but for poses of
+    frames and the time offset, of which there is more to say."""
     names = []
     for field, value in imu.ListFields():
-        if field.name == "q_ai":
+        if field.name in ("q_ai", "q_ji", "p_ji", "time_offset_s"):
             continue
         if field.message_type is not None:
             corrects = value != getattr(_NOMINAL, field.name)
@@ -287,11 +293,20 @@ def losses(calibration: v1.CalibrationParameters) -> list[str]:
                 f"cam{number}: its slopes with temperature are not included; "
                 "the values are those at the reference temperature"
             )
-    corrected = _corrections(calibration.imu)
-    if corrected:
-        lost.append(
-            f"imu: {', '.join(corrected)} "
-            f"{'is' if len(corrected) == 1 else 'are'} not included; readings "
-            "are raw"
-        )
+    imus = [("imu", calibration.imu)]
+    if calibration.HasField("imu1"):
+        imus.append(("imu1", calibration.imu1))
+    for name, one in imus:
+        corrected = _corrections(one)
+        if corrected:
+            lost.append(
+                f"{name}: {', '.join(corrected)} "
+                f"{'is' if len(corrected) == 1 else 'are'} not included; "
+                "readings are raw"
+            )
+        if one.time_offset_s != 0:
+            lost.append(
+                f"{name}: the time offset of {one.time_offset_s:g} s is not "
+                "included; readings keep their own timestamps"
+            )
     return lost

@@ -6,17 +6,19 @@ writes a file for each session, FOLDER/SESSION.mcap, with the named segments
 (``session~index``) or all segments whose data is kept. Needs the extra
 ``mcap``: ``pip install 'selfcal[mcap]'``.
 
-Frames are G (the session's), I (the body), A (the accelerometer) and cam0,
-cam1, ...; times are those of the session's clock.
+Frames are G (the session's), I (the body), A (the accelerometer), cam0, cam1,
+..., and J and A1 for the gyroscope and the accelerometer of a second IMU; times
+are those of the session's clock.
 
 ==================== ================================== =====================
 topic                schema                             one message for each
 ==================== ================================== =====================
 /tf                  foxglove.FrameTransform            keyframe: I in G; and
-                                                        segment: A, camN in I
+                                                        segment: A, camN, J
+                                                        in I, A1 in J
 /keyframes           foxglove.PoseInFrame               keyframe: I in G
 /motion              selfcal.mcap.KeyframeMotion        keyframe
-/imu                 selfcal.mcap.ImuReading            sample
+/imu, /imu1          selfcal.mcap.ImuReading            sample
 /landmarks           foxglove.PointCloud                segment, in G
 /camN/calibration    foxglove.CameraCalibration         segment
 /camN/observations   foxglove.ImageAnnotations          keyframe
@@ -64,15 +66,21 @@ def write(
     """
     timed: list[_foxglove.Timed] = []
     sessions = set()
-    readings: set = set()  # neighbours share samples
+    # Neighbours share samples.
+    readings: dict[str, set[int]] = {"/imu": set(), "/imu1": set()}
     names = []
     for segment in segments:
         sessions.add(segment.session)
         names.append(f"{segment.session}~{segment.index}")
         timed += _foxglove.sensors(calibration, segment.keyframes.t_ns[0])
         timed += _foxglove.keyframes(segment.keyframes)
-        timed += [r for r in _foxglove.imu(segment.imu) if r[0] not in readings]
-        readings.update(segment.imu.t_ns)
+        for topic, samples in ("/imu", segment.imu), ("/imu1", segment.imu1):
+            timed += [
+                reading
+                for reading in _foxglove.imu(samples, topic)
+                if reading[0] not in readings[topic]
+            ]
+            readings[topic].update(samples.t_ns)
         timed += _foxglove.landmarks(segment)
         timed += _foxglove.observations(segment)
     if len(sessions) != 1:

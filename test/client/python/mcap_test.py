@@ -273,6 +273,57 @@ class McapTest(DemoDevice):
             self.assertEqual(camera.distortion_model, name)
             self.assertEqual(list(camera.D), coefficients)
 
+    def test_a_second_imu_has_its_frames_and_readings(self) -> None:
+        calibration = v1.CalibrationParameters()
+        calibration.CopyFrom(self.calibration)
+        second = calibration.imu1
+        for vector in (second.s_g, second.s_a):
+            vector.x = vector.y = vector.z = 1
+        second.m_a.y = 0.01
+        second.q_ai.w = 1
+        # J is turned by 90 degrees about x: y of I is z of J.
+        second.q_ji.w, second.q_ji.x = np.sqrt(0.5), np.sqrt(0.5)
+        second.p_ji.x, second.p_ji.z = 0.1, 0.02
+        second.time_offset_s = 0.003
+        segments = []
+        sent = {}
+        for segment in self.segments:
+            segments.append(segment_pb2.MotionSegment())
+            segments[-1].CopyFrom(segment)
+            samples = segments[-1].imu1
+            samples.t_ns.extend(t + 1000 for t in segment.imu.t_ns)
+            samples.gyro.extend(2 * v for v in segment.imu.gyro)
+            samples.accel.extend(3 * v for v in segment.imu.accel)
+            for i, t_ns in enumerate(samples.t_ns):
+                sent[t_ns] = list(samples.gyro[3 * i : 3 * i + 3]) + list(
+                    samples.accel[3 * i : 3 * i + 3]
+                )
+        file = io.BytesIO()
+        lost = mcap.write(file, segments, calibration)
+        self.assertIn("imu1: m_a is not included; readings are raw", lost)
+        self.assertIn(
+            "imu1: the time offset of 0.003 s is not included; readings keep "
+            "their own timestamps",
+            lost,
+        )
+        file.seek(0)
+        topics = read(file)
+        self.assertEqual(len(topics["/imu"]), len(self.topics["/imu"]))
+        got = {t: xyz(m.gyro) + xyz(m.accel) for _, t, m in topics["/imu1"]}
+        self.assertEqual(got, sent)
+        self.assertEqual(len(topics["/imu1"]), len(sent))
+        frames = {m.child_frame_id: m for _, _, m in topics["/tf"]}
+        self.assertEqual(frames["J"].parent_frame_id, "I")
+        self.assertEqual(frames["A1"].parent_frame_id, "J")
+        # T_JI takes J's place in I to the origin of J.
+        place = np.array(xyz(frames["J"].translation))
+        np.testing.assert_allclose(
+            matrix(second.q_ji) @ place + xyz(second.p_ji), 0, atol=1e-15
+        )
+        np.testing.assert_allclose(
+            matrix(frames["J"].rotation) @ [0, 0, 1], [0, 1, 0], atol=1e-15
+        )
+
     def test_refuses_what_one_file_cannot_hold(self) -> None:
         other = segment_pb2.MotionSegment()
         other.CopyFrom(self.segments[0])
