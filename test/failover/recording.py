@@ -17,6 +17,9 @@ from failover.local_daemon import LocalDaemon
 from selfcal.v1 import rig_pb2, segment_pb2
 
 _SECONDS = 120  # of the recording
+# Of how many landmarks one is kept: a score and a run cost that much less, and
+# what the fleet does with them stays the same.
+_THINNING = 3
 _KNOCK_PX = 2.0
 
 
@@ -75,7 +78,26 @@ def record(folder: pathlib.Path, demo: str, daemon: str) -> Recording:
         source.stop()
     if len(segments) < 8:
         raise processes.Failed(f"the demo left {len(segments)} segments")
-    return Recording(rig, segments)
+    return Recording(rig, [_thin(segment) for segment in segments])
+
+
+def _thin(segment: segment_pb2.MotionSegment) -> segment_pb2.MotionSegment:
+    thin = segment_pb2.MotionSegment()
+    thin.CopyFrom(segment)
+    thin.ClearField("landmarks")
+    thin.ClearField("observations")
+    landmarks, seen = segment.landmarks, segment.observations
+    kept = range(0, len(landmarks.id), _THINNING)
+    thin.landmarks.id.extend(landmarks.id[k] for k in kept)
+    for k in kept:
+        thin.landmarks.p_g.extend(landmarks.p_g[3 * k : 3 * k + 3])
+    for k, landmark in enumerate(seen.landmark):
+        if landmark in kept:
+            thin.observations.keyframe.append(seen.keyframe[k])
+            thin.observations.camera.append(seen.camera[k])
+            thin.observations.landmark.append(landmark // _THINNING)
+            thin.observations.z_px.extend(seen.z_px[2 * k : 2 * k + 2])
+    return thin
 
 
 def digest(segment: segment_pb2.MotionSegment) -> str:
