@@ -17,8 +17,8 @@ from failover.local_daemon import LocalDaemon
 from selfcal.v1 import rig_pb2, segment_pb2
 
 _SECONDS = 120  # of the recording
-# Of how many landmarks one is kept: a score and a run cost that much less, and
-# what the fleet does with them stays the same.
+# One landmark of so many is kept: scores and runs cost less, and what the fleet
+# does with them stays the same.
 _THINNING = 3
 _KNOCK_PX = 2.0
 
