@@ -204,8 +204,8 @@ CohortCourse FollowInCohort(const Rig& rig,
   return course;
 }
 
-// The number of segments until sigma is at most the target, which it is at the
-// end or one segment later.
+// The number of segments until sigma is at most the target; one more than all
+// if it never is.
 int Until(const std::vector<double>& sigma,
           const std::vector<int>& numbers,
           double target) {
