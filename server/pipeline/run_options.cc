@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/change/aged.h"
+#include "server/domain/device_change.h"
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/stored_information.h"
 #include "server/status/status_macros.h"
@@ -24,8 +25,9 @@ absl::StatusOr<CalibrateOptions> OptionsOfRun(Domain* domain,
   if (run.change == 0) return options;
   SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
                            store->GetChange(run.rig, run.change));
-  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration before,
+  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration before,
                            store->GetCalibration(run.rig, change.base_version));
+  before.covariance = CovarianceAt(rig, before, run.create_steady_ns);
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
                            ListInformation(store, run.rig, run.segments));
   options.prior = KnownAfter(rig.rig, change, before, since);
