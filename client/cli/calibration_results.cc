@@ -70,7 +70,14 @@ int WriteResults(Context* context,
       {.rig = rig_id, .output = (to / "report.html").string(), .force = true});
   if (report != kDone) return report;
   PrintError(fmt::format("report and files are in {}", folder));
-  return calibration.verdict().kind() == v1::Verdict::WEAK ? kWeak : kDone;
+  switch (calibration.verdict().kind()) {
+    case v1::Verdict::GOOD:
+      return kDone;
+    case v1::Verdict::WEAK:
+      return kWeak;
+    default:
+      return kFailed;
+  }
 }
 
 }  // namespace selfcal::client

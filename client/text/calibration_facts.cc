@@ -52,11 +52,19 @@ void AddProvenance(const v1::Calibration::Provenance& provenance,
 
 void AddVerdict(const v1::Calibration& calibration, FactList* facts) {
   Add(facts, "verdict", VerdictText(calibration));
-  // If it is not trustworthy, the sentences are the reasons of the rejection.
-  if (calibration.verdict().kind() == v1::Verdict::NOT_TRUSTWORTHY) return;
-  const bool weak = calibration.verdict().kind() == v1::Verdict::WEAK;
-  for (const std::string& sentence : calibration.verdict().sentences()) {
-    Add(facts, weak ? "weak because" : "note", sentence);
+  const auto& verdict = calibration.verdict();
+  // The reasons of a rejection are listed as such.
+  if (verdict.kind() == v1::Verdict::NOT_TRUSTWORTHY &&
+      calibration.reasons_size() > 0) {
+    return;
+  }
+  const bool is_note = verdict.kind() == v1::Verdict::GOOD ||
+                       verdict.kind() == v1::Verdict::FACTORY ||
+                       verdict.kind() == v1::Verdict::UNKNOWN;
+  const std::string name =
+      is_note ? "note" : VerdictText(calibration) + " because";
+  for (const std::string& sentence : verdict.sentences()) {
+    Add(facts, name, sentence);
   }
 }
 

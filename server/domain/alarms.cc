@@ -13,7 +13,7 @@ std::vector<Alarm> AlarmsOf(const RigSummary& rig, std::int64_t now_ns) {
   if (rig.unlike_cohort != 0 && rig.unlike_cohort == rig.active_version) {
     alarms.push_back(Alarm::kUnlikeCohort);
   }
-  if (rig.newest_change_ns > rig.active_since_ns) {
+  if (rig.changed_since != 0) {
     alarms.push_back(Alarm::kDeviceChanged);
   }
   if (rig.newest_state == CalibrationState::kRejected) {

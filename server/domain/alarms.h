@@ -20,7 +20,7 @@ enum class Alarm {
   kTableStarved = 1,
   kRunFailed = 2,      // the newest one
   kRejected = 3,       // the newest version
-  kDeviceChanged = 4,  // since the active version became active
+  kDeviceChanged = 4,  // since the run of the active version
   kUnlikeCohort = 5,   // the active version contradicts the cohort of the rig
 };
 

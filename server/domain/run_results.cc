@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -72,6 +76,29 @@ absl::Status CheckValidation(UnitOfWork* tx,
   return absl::OkStatus();
 }
 
+// False if a check failed for which a device change is no reason: segments that
+// do not fit, or a solver that did not converge, show no change that could be
+// believed.
+bool ChangeExplains(const StoredCalibration& validated) {
+  static constexpr std::string_view kExplained[] = {"segments_used",
+                                                    "prior_sigmas",
+                                                    "prior_agreement",
+                                                    "rank",
+                                                    "sigma_growth",
+                                                    "halves",
+                                                    "disagreement",
+                                                    "held_out_probability",
+                                                    "confirmed"};
+  if (!validated.validation) return true;
+  const auto& checks = validated.validation->checks;
+  return std::all_of(checks.begin(), checks.end(), [](const auto& check) {
+    return check.outcome != CheckOutcome::kFailed ||
+           std::find(std::begin(kExplained),
+                     std::end(kExplained),
+                     check.name) != std::end(kExplained);
+  });
+}
+
 // Rejects a result that is outdated by what happened since the run was created.
 absl::Status RejectIfOutdated(UnitOfWork* tx,
                               const StoredRun& run,
@@ -127,8 +154,10 @@ absl::StatusOr<StoredCalibration> FinishRun(
   validated.reasons = calibration.reasons;
   validated.validation = calibration.validation;
   validated.verdict = calibration.verdict;
-  SELFCAL_ASSIGN_OR_RETURN(const auto split,
-                           StoreSplit(tx, run, validated, options));
+  std::optional<StoredChange> split;
+  if (ChangeExplains(validated)) {
+    SELFCAL_ASSIGN_OR_RETURN(split, StoreSplit(tx, run, validated, options));
+  }
   SELFCAL_RETURN_IF_ERROR(
       RejectIfOutdated(tx, run, split.has_value(), &validated));
   SELFCAL_RETURN_IF_ERROR(EndValidation(tx, validated));

@@ -112,6 +112,13 @@ Verdict VerdictOf(const StoredCalibration& calibration) {
   if (!calibration.disagreement.empty()) {
     return {VerdictKind::kNotTrustworthy, {calibration.disagreement}};
   }
+  if (calibration.changed_since != 0) {
+    return {VerdictKind::kNotTrustworthy,
+            {fmt::format("The device has changed since (change {}): it is of "
+                         "the device before. Record new motion: the next "
+                         "version is computed on segments since the change.",
+                         calibration.changed_since)}};
+  }
   if (calibration.verdict.kind != VerdictKind::kUnknown) {
     return calibration.verdict;
   }

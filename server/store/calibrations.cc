@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/status/status_macros.h"
+#include "server/store/changed_since.h"
 #include "server/store/checksum.h"
 #include "server/store/driver/statement.h"
 #include "server/store/paging.h"
@@ -20,16 +21,19 @@
 namespace selfcal::server {
 namespace {
 
-constexpr char kCalibrationColumns[] =
-    "SELECT c.version, c.state, c.create_time_ns, c.run, c.content, c.sha256, "
-    "  v.content, v.sha256, "
-    "  (SELECT coalesce(max(a.activation), 0) FROM activations a "
-    "   WHERE a.rig = c.rig AND a.version = c.version), "
-    "  (SELECT coalesce(max(d.finding), '') FROM disagreements d "
-    "   WHERE d.rig = c.rig AND d.version = c.version), "
-    "  c.create_steady_ns, c.rig, g.id "
-    "FROM calibrations c JOIN rigs g ON g.rig = c.rig "
-    "LEFT JOIN validations v ON v.rig = c.rig AND v.version = c.version ";
+std::string SelectCalibrations() {
+  return fmt::format(
+      "SELECT c.version, c.state, c.create_time_ns, c.run, c.content, "
+      "  c.sha256, v.content, v.sha256, "
+      "  (SELECT coalesce(max(a.activation), 0) FROM activations a "
+      "   WHERE a.rig = c.rig AND a.version = c.version), "
+      "  (SELECT coalesce(max(d.finding), '') FROM disagreements d "
+      "   WHERE d.rig = c.rig AND d.version = c.version), "
+      "  c.create_steady_ns, c.rig, g.id, {} "
+      "FROM calibrations c JOIN rigs g ON g.rig = c.rig "
+      "LEFT JOIN validations v ON v.rig = c.rig AND v.version = c.version ",
+      kChangedSince);
+}
 
 void Include(double temperature_c,
              std::optional<SegmentTemperatures>* temperatures) {
@@ -120,6 +124,7 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(
   calibration.activation = row.Int(8);
   calibration.disagreement = row.Text(9);
   calibration.create_steady_ns = row.Int(10);
+  calibration.changed_since = row.Int(13);
   return calibration;
 }
 
@@ -159,7 +164,7 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfMany(
   AddRigConditions(of, "g", &condition);
   Statement read(db,
                  condition.reuse(),
-                 std::string(kCalibrationColumns) +
+                 SelectCalibrations() +
                      "WHERE (c.create_steady_ns, c.rig, c.version) < "
                      "  (?1, ?2, ?3) AND " +
                      condition.sql() +
@@ -212,11 +217,10 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
                                                   const std::string& rig,
                                                   std::int64_t version) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  Statement read(
-      db,
-      std::string(kCalibrationColumns) + "WHERE c.rig = ?1 AND c.version = ?2",
-      rig_id,
-      version);
+  Statement read(db,
+                 SelectCalibrations() + "WHERE c.rig = ?1 AND c.version = ?2",
+                 rig_id,
+                 version);
   const bool found = read.Next();
   SELFCAL_RETURN_IF_ERROR(read.status());
   if (!found) {
@@ -248,7 +252,7 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   const int size = PageSize(page);
   Statement read(db,
-                 std::string(kCalibrationColumns) +
+                 SelectCalibrations() +
                      "WHERE c.rig = ?1 AND c.version < ?2 "
                      "ORDER BY c.version DESC LIMIT ?3",
                  rig_id,

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/status/status_macros.h"
+#include "server/store/changed_since.h"
 #include "server/store/paging.h"
 #include "server/store/rigs.h"
 #include "server/store/table_rows.h"
@@ -192,19 +193,21 @@ absl::Status ReadNewest(Connection* db, const Summaries& summaries) {
   return ReadEach(
       db,
       summaries,
-      "SELECT g.rig, c.version, (SELECT a.time_ns FROM activations a "
-      "    WHERE a.rig = c.rig AND a.version = c.version "
-      "    ORDER BY a.activation DESC LIMIT 1), "
-      "  n.version, n.state, r.run, r.state, "
-      "  (SELECT d.time_ns FROM changes d WHERE d.rig = g.rig "
-      "   ORDER BY d.change DESC LIMIT 1), "
-      "  (SELECT o.version FROM cohort_outliers o WHERE o.rig = g.rig) "
-      "FROM rigs g "
-      "LEFT JOIN calibrations c ON c.rig = g.rig AND c.state = 1 "
-      "LEFT JOIN calibrations n ON n.rig = g.rig AND n.version = "
-      "  (SELECT max(version) FROM calibrations m WHERE m.rig = g.rig) "
-      "LEFT JOIN runs r ON r.rig = g.rig AND r.run = "
-      "  (SELECT max(run) FROM runs m WHERE m.rig = g.rig)",
+      fmt::format(
+          "SELECT g.rig, c.version, (SELECT a.time_ns FROM activations a "
+          "    WHERE a.rig = c.rig AND a.version = c.version "
+          "    ORDER BY a.activation DESC LIMIT 1), "
+          "  n.version, n.state, r.run, r.state, "
+          "  (SELECT d.time_ns FROM changes d WHERE d.rig = g.rig "
+          "   ORDER BY d.change DESC LIMIT 1), "
+          "  (SELECT o.version FROM cohort_outliers o WHERE o.rig = g.rig), {} "
+          "FROM rigs g "
+          "LEFT JOIN calibrations c ON c.rig = g.rig AND c.state = 1 "
+          "LEFT JOIN calibrations n ON n.rig = g.rig AND n.version = "
+          "  (SELECT max(version) FROM calibrations m WHERE m.rig = g.rig) "
+          "LEFT JOIN runs r ON r.rig = g.rig AND r.run = "
+          "  (SELECT max(run) FROM runs m WHERE m.rig = g.rig)",
+          kChangedSince),
       [](const Statement& row, RigSummary* summary) {
         summary->active_version = row.Int(1);
         summary->active_since_ns = row.Int(2);
@@ -218,6 +221,7 @@ absl::Status ReadNewest(Connection* db, const Summaries& summaries) {
         }
         summary->newest_change_ns = row.Int(7);
         summary->unlike_cohort = row.Int(8);
+        summary->changed_since = row.Int(9);
       });
 }
 

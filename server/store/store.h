@@ -194,6 +194,8 @@ struct StoredCalibration {
   // The finding of a verification by which the two cores disagree on what this
   // version rests on, so that it must not be trusted. Empty: none.
   std::string disagreement;
+  // The newest change of the device that its run does not account for; 0: none.
+  std::int64_t changed_since = 0;
   // Number of its newest activation, counted from 1 in its rig; 0 if it never
   // was active.
   std::int64_t activation = 0;
@@ -303,6 +305,7 @@ struct RigSummary {
   std::int64_t newest_run = 0;  // 0: none, as for the change
   RunState run_state = RunState::kPending;
   std::int64_t newest_change_ns = 0;  // device change
+  std::int64_t changed_since = 0;     // of the active version
   std::int64_t unlike_cohort = 0;     // version that contradicts the cohort
   std::optional<ReportState> uplink;  // on a device that has a hub
   std::optional<ReportState> device;  // at the hub, if a device reports it

@@ -91,6 +91,15 @@ TEST(CalibrationFacts, GiveTheReasonsOfARejectedOneOnce) {
   EXPECT_THAT(Texts(calibration, "note"), IsEmpty());
 }
 
+TEST(CalibrationFacts, GiveTheReasonWhyAnActiveOneIsNotTrustworthy) {
+  v1::Calibration calibration;
+  calibration.mutable_verdict()->set_kind(v1::Verdict::NOT_TRUSTWORTHY);
+  calibration.mutable_verdict()->set_text("not trustworthy");
+  calibration.mutable_verdict()->add_sentences("The two cores disagree.");
+  EXPECT_THAT(Texts(calibration, "not trustworthy because"),
+              ElementsAre("The two cores disagree."));
+}
+
 TEST(CalibrationFacts, TellAFailedCheckFromOneThatWasNotMade) {
   v1::Calibration calibration;
   auto* check = calibration.mutable_validation()->add_checks();

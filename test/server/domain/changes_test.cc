@@ -1,3 +1,4 @@
+#include "server/domain/alarms.h"
 #include "test/core/change/random_information.h"
 #include "test/server/store/store_test.h"
 
@@ -57,6 +58,30 @@ class ChangesTest : public StoreTest {
     }
     ADD_FAILURE() << "the change was not detected";
     return {};
+  }
+
+  // The active version that the next run gives, on segments since the change.
+  StoredCalibration RunAfterChange() {
+    std::optional<StoredRun> run;
+    while (!run && next_ < 60) run = Next(turned_).started_run;
+    if (!run) {
+      // One from before may still be under way.
+      EXPECT_EQ(store_->ListUnfinishedRuns()->size(), 1u);
+      run = store_->ListUnfinishedRuns()->front();
+    }
+    EXPECT_TRUE(domain_->BeginRun("a", run->run).ok());
+    const auto finished = domain_->FinishRun(
+        "a", run->run, Result(BoxPlus(rig_.factory, turned_)));
+    EXPECT_TRUE(finished.ok()) << finished.status();
+    if (!finished.ok()) return {};
+    EXPECT_EQ(finished->state, CalibrationState::kActive);
+    return *finished;
+  }
+
+  std::vector<Alarm> Alarms() {
+    const auto listed = store_->ListRigSummaries({}, {100, ""});
+    EXPECT_TRUE(listed.ok()) << listed.status();
+    return AlarmsOf(listed->items.at(0), NowNs());
   }
 
   std::vector<StoredEvent> Events() {
@@ -213,6 +238,24 @@ TEST_P(ChangesTest, TheNextRunIsOnSegmentsAfterItAlone) {
   EXPECT_EQ(run->segments, started->segments);
 }
 
+TEST_P(ChangesTest, AVersionFromBeforeIsKnownAsSuchUntilOneReplacesIt) {
+  EXPECT_EQ(store_->GetActiveCalibration("a")->changed_since, 0);
+  EXPECT_THAT(Alarms(), ::testing::IsEmpty());
+  Shock();
+  EXPECT_EQ(store_->GetActiveCalibration("a")->changed_since, 1);
+  EXPECT_THAT(Alarms(), ElementsAre(Alarm::kDeviceChanged));
+  const StoredCalibration after = RunAfterChange();
+  EXPECT_EQ(after.changed_since, 0);
+  EXPECT_THAT(Alarms(), ::testing::IsEmpty());
+  // Whoever goes back to it goes back to the device before.
+  ASSERT_TRUE(domain_->ActivateCalibration("a", 2, "eve", "trial").ok());
+  EXPECT_EQ(store_->GetActiveCalibration("a")->changed_since, 1);
+  EXPECT_EQ(store_->GetCalibration("a", 1)->changed_since, 0) << "no estimate";
+  EXPECT_THAT(Alarms(), ElementsAre(Alarm::kDeviceChanged));
+  Reopen();
+  EXPECT_THAT(Alarms(), ElementsAre(Alarm::kDeviceChanged));
+}
+
 TEST_P(ChangesTest, NothingIsTestedUntilThereIsACalibrationAfterIt) {
   Many(6, zero_);
   Shock();
@@ -221,18 +264,8 @@ TEST_P(ChangesTest, NothingIsTestedUntilThereIsACalibrationAfterIt) {
 
 TEST_P(ChangesTest, ASecondOneIsFoundAgainstTheCalibrationAfterTheFirst) {
   Shock();
-  std::optional<StoredRun> run;
-  while (!run && next_ < 60) run = Next(turned_).started_run;
-  if (!run) {
-    // One from before may still be under way.
-    ASSERT_EQ(store_->ListUnfinishedRuns()->size(), 1u);
-    run = store_->ListUnfinishedRuns()->front();
-  }
-  ASSERT_TRUE(domain_->BeginRun("a", run->run).ok());
+  const StoredCalibration finished = RunAfterChange();
   const StoredCalibration calibration = Result(BoxPlus(rig_.factory, turned_));
-  const auto finished = domain_->FinishRun("a", run->run, calibration);
-  ASSERT_TRUE(finished.ok()) << finished.status();
-  ASSERT_EQ(finished->state, CalibrationState::kActive);
   // Estimated with the calibration before, it is too far to be tested.
   EXPECT_FALSE(Next(zero_).change);
   const auto next = [&](const Eigen::VectorXd& offset) {
@@ -247,7 +280,7 @@ TEST_P(ChangesTest, ASecondOneIsFoundAgainstTheCalibrationAfterTheFirst) {
   for (int i = 0; i < 8 && !second; ++i) second = next(turned_)->change;
   ASSERT_TRUE(second);
   EXPECT_EQ(second->change, 2);
-  EXPECT_EQ(second->base_version, finished->version);
+  EXPECT_EQ(second->base_version, finished.version);
 }
 
 TEST_P(ChangesTest, ARunFromBeforeIsRejected) {
@@ -267,7 +300,9 @@ TEST_P(ChangesTest, ARunFromBeforeIsRejected) {
 // The segments of the next run are of two devices, as its result tells.
 class SplitRunTest : public ChangesTest {
  protected:
-  StoredCalibration FinishSplit(double without_one) {
+  // `failed`: a check that rejects the result.
+  StoredCalibration FinishSplit(double without_one,
+                                const std::string& failed = "") {
     std::optional<StoredRun> run;
     while (!run && next_ < 200) run = Next(zero_).started_run;
     EXPECT_TRUE(run);
@@ -280,6 +315,14 @@ class SplitRunTest : public ChangesTest {
                                        .first = {"s", next_ - 3},
                                        .block = "cam0.q_CI",
                                        .concerned = {"extrinsics"}};
+    if (!failed.empty()) {
+      result.state = CalibrationState::kRejected;
+      result.reasons = {"It failed."};
+      result.validation = StoredValidation();
+      result.validation->active_version = 2;
+      result.validation->checks = {
+          {failed, 0, 0, CheckOutcome::kFailed, "It failed."}};
+    }
     const auto finished = domain_->FinishRun("a", run->run, result);
     EXPECT_TRUE(finished.ok()) << finished.status();
     return finished.value_or(StoredCalibration());
@@ -294,6 +337,9 @@ TEST_P(SplitRunTest, ASureOneIsAChangeOfTheDevice) {
   // It accounts for the change.
   EXPECT_EQ(finished.state, CalibrationState::kActive);
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, finished.version);
+  EXPECT_EQ(finished.changed_since, 0);
+  EXPECT_EQ(store_->GetCalibration("a", 2)->changed_since, 1);
+  EXPECT_THAT(Alarms(), ::testing::IsEmpty());
   const auto change = store_->GetChange("a", 1);
   ASSERT_TRUE(change.ok()) << change.status();
   EXPECT_EQ(change->first_sequence, next_ - 3 + 1);  // indices count from 0
@@ -324,6 +370,18 @@ TEST_P(SplitRunTest, ASureOneIsAChangeOfTheDevice) {
   EXPECT_EQ(report->remembered.split->first, (SegmentKey{"s", next_ - 3}));
   EXPECT_EQ(report->remembered.split->newer, 3);
   EXPECT_THAT(report->remembered.split->concerned, ElementsAre("extrinsics"));
+}
+
+TEST_P(SplitRunTest, WhatDoesNotFitShowsNone) {
+  EXPECT_EQ(FinishSplit(1e-6, "pixel_residuals").state,
+            CalibrationState::kRejected);
+  EXPECT_TRUE(absl::IsNotFound(store_->GetChange("a", 1).status()));
+}
+
+TEST_P(SplitRunTest, OneThatExplainsWhyTheRunWasRejectedIsOne) {
+  EXPECT_EQ(FinishSplit(1e-6, "halves").state, CalibrationState::kRejected);
+  EXPECT_TRUE(store_->GetChange("a", 1).ok());
+  EXPECT_EQ(store_->GetActiveCalibration("a")->changed_since, 1);
 }
 
 TEST_P(SplitRunTest, OneThatIsNotSureIsNone) {

@@ -41,6 +41,10 @@ TEST(VerdictTest, ThatOfAVersionIsTheStoredOne) {
   EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kNotTrustworthy);
   EXPECT_THAT(VerdictOf(version).sentences,
               ElementsAre("The two cores disagree."));
+  version.disagreement.clear();
+  version.changed_since = 2;
+  EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kNotTrustworthy);
+  EXPECT_THAT(VerdictOf(version).sentences, ElementsAre(HasSubstr("change 2")));
   // The store rejects what no longer holds, whatever was found before.
   version.state = CalibrationState::kRejected;
   version.reasons = {"The device has changed."};
