@@ -3,15 +3,10 @@
 #include <Eigen/Cholesky>
 
 #include "core/change/chi_square.h"
+#include "core/change/consistency.h"
 #include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
-namespace {
-
-// A direction is tested if both sides have more information than the prior.
-constexpr double kObserved = 1;
-
-}  // namespace
 
 AgreementTest TestAgreement(const Eigen::MatrixXd& Lambda,
                             const Eigen::VectorXd& eta,
@@ -28,6 +23,7 @@ AgreementTest TestAgreement(const Eigen::MatrixXd& Lambda,
   const SymmetricEigen eigen((covariance + covariance.transpose()) / 2);
   const Eigen::VectorXd along = eigen.eigenvectors().transpose() * score;
   for (Eigen::Index i = 0; i < along.size(); ++i) {
+    // Both sides have more information than the prior.
     if (!(eigen.eigenvalues()(i) > kObserved)) continue;
     ++test.degrees;
     test.statistic += along(i) * along(i) / eigen.eigenvalues()(i);

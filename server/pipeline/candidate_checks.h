@@ -29,7 +29,7 @@ void AddNotTested(std::string name,
                   std::vector<ValidationCheck>* checks);
 
 // candidate_fit.cc: how well the data fits the result. observations_used,
-// segments_used, pixel_residuals, segment_residuals, noise, preflight.
+// segments_used, pixel_residuals, segment_residuals, noise, preflight, effects.
 void CheckFit(const CheckContext& context,
               std::vector<ValidationCheck>* checks);
 

@@ -262,6 +262,54 @@ void CheckPreflight(const CheckContext& context,
   if (failure.empty()) checks->back().sentence = notes;
 }
 
+// The effect of the largest bias among those that the segments show for
+// certain; null: none.
+const AbsentEffect* WorstEffect(const CheckContext& context) {
+  const std::vector<AbsentEffect>& effects = *context.evidence.effects;
+  const double certain =
+      context.limits.min_probability /
+      static_cast<double>(std::max(effects.size(), size_t{1}));
+  const AbsentEffect* worst = nullptr;
+  for (const AbsentEffect& effect : effects) {
+    if (!(effect.test.probability < certain)) continue;
+    if (worst == nullptr || effect.test.statistic / effect.test.degrees >
+                                worst->test.statistic / worst->test.degrees) {
+      worst = &effect;
+    }
+  }
+  return worst;
+}
+
+void CheckEffects(const CheckContext& context,
+                  std::vector<ValidationCheck>* checks) {
+  const CandidateLimits& limits = context.limits;
+  if (!context.evidence.effects) {
+    AddNotTested("effects",
+                 limits.max_bias_sigmas,
+                 "Effects that the rig does not estimate could not be tested.",
+                 checks);
+    return;
+  }
+  const AbsentEffect* worst = WorstEffect(context);
+  const double bias = worst == nullptr ? 0 : worst->bias_sigmas;
+  std::string sentence;
+  if (bias > limits.doubtful_bias_sigmas) {
+    sentence = fmt::format(
+        "The segments show an effect that the rig does not estimate, most "
+        "likely {} (probability {:.1g} without it): it shifts {} by {:.1f} "
+        "sigma. Create a rig that estimates it (--block '{}=on').",
+        worst->block,
+        worst->test.probability,
+        worst->component,
+        bias,
+        worst->block);
+  }
+  const bool fails = bias > limits.max_bias_sigmas;
+  AddResult(
+      "effects", bias, limits.max_bias_sigmas, fails ? sentence : "", checks);
+  if (!fails) checks->back().sentence = sentence;
+}
+
 }  // namespace
 
 void CheckFit(const CheckContext& context,
@@ -272,6 +320,7 @@ void CheckFit(const CheckContext& context,
   CheckSegmentResiduals(context, checks);
   CheckNoise(context, checks);
   CheckPreflight(context, checks);
+  CheckEffects(context, checks);
 }
 
 }  // namespace selfcal::server

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/absent_effects.h"
 #include "core/calibration/calibrate.h"
 #include "core/model/rig.h"
 #include "core/population/consistency.h"
@@ -55,6 +56,12 @@ struct CandidateLimits {
   // model or of the data. Chosen, not measured.
   double max_pixel_noise = 10;
   double max_imu_noise = 20;
+  // An effect that the rig does not estimate may shift a component by this many
+  // sigmas of the candidate, and by so many without making it weak: chosen on
+  // simulated devices, so that the shift and the noise together remain
+  // below 4.5 sigmas (./test/evaluate --only trust).
+  double max_bias_sigmas = 2;
+  double doubtful_bias_sigmas = 1;
   // A component may lie this many prior sigmas from the factory's value.
   // Chosen, not measured.
   double max_prior_sigmas = 10;
@@ -64,8 +71,9 @@ struct CandidateLimits {
   // A component is treated as observed if its sigma is below this part of the
   // prior's. Chosen, not measured.
   double observed_below = 0.5;
-  // For the agreement of the halves, of held-out segments with the candidate,
-  // and of the data with the prior. Chosen, not measured: each of the tests
+  // For effects that the rig does not estimate, and for the agreement of the
+  // halves, of held-out segments with the candidate, and of the data with the
+  // prior. Chosen, not measured: each of the tests
   // rejects at most one sound candidate in 10,000, if the noise is as assumed.
   double min_probability = 1e-4;
   // Errors of the candidate over the stated ones, if the data contradicts the
@@ -98,6 +106,8 @@ struct CandidateEvidence {
   // Pre-flight of the segments that the result uses, at the calibration that
   // the run started from; nullopt if they could not be read.
   std::optional<Diagnosis> diagnosis;
+  // Of these segments; nullopt likewise, or if the solver did not converge.
+  std::optional<std::vector<AbsentEffect>> effects;
 };
 
 struct CandidateValidation {
@@ -121,6 +131,9 @@ struct CandidateValidation {
 //   what noise can be;
 // - preflight: the segments show none of the common mistakes (core/preflight)
 //   that bias a calibration;
+// - effects: no effect that the rig does not estimate shifts a component by
+// much
+//   more than its uncertainty;
 // - prior_sigmas: no free component is further from the factory's value than
 //   the tolerances allow;
 // - prior_agreement: the data does not contradict the prior, or determines

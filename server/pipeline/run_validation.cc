@@ -114,15 +114,12 @@ absl::StatusOr<HeldOutSegments> GatherHeldOut(const RunContext& context,
   return segments;
 }
 
-// nullopt if the data of a segment is damaged or gone.
-absl::StatusOr<std::optional<Diagnosis>> DiagnoseUsed(
+// The segments that the result uses; nullopt if the data of one is damaged or
+// gone.
+absl::StatusOr<std::optional<std::vector<MotionSegment>>> ReadUsed(
     const RunContext& context,
     const StoredRun& run,
-    const Rig& rig,
     const CalibrationResult& result) {
-  SELFCAL_ASSIGN_OR_RETURN(
-      const StoredCalibration base,
-      context.store()->GetCalibration(run.rig, run.base_version));
   std::vector<MotionSegment> segments;
   for (const SegmentKey& key : run.segments) {
     if (IsExcluded(result, key)) continue;
@@ -134,7 +131,31 @@ absl::StatusOr<std::optional<Diagnosis>> DiagnoseUsed(
     SELFCAL_RETURN_IF_ERROR(segment.status());
     segments.push_back(*std::move(segment));
   }
-  return Diagnose(rig, base.theta, segments);
+  return segments;
+}
+
+// What only their data shows: common mistakes, and effects that the rig does
+// not estimate.
+absl::Status ExamineUsed(const RunContext& context,
+                         const StoredRun& run,
+                         const Rig& rig,
+                         const CalibrationResult& result,
+                         CandidateEvidence* evidence) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const StoredCalibration base,
+      context.store()->GetCalibration(run.rig, run.base_version));
+  SELFCAL_ASSIGN_OR_RETURN(const auto segments, ReadUsed(context, run, result));
+  if (!segments) return absl::OkStatus();
+  evidence->diagnosis = Diagnose(rig, base.theta, *segments);
+  // Elsewhere than at the minimum, theta itself explains what is left.
+  if (result.status == CalibrateStatus::kConverged &&
+      HasUsableNumbers(rig, result)) {
+    evidence->effects = TestAbsentEffects(
+        WithUsedNoise(rig, result),
+        {result.theta, result.covariance, result.track_noise_factor},
+        *segments);
+  }
+  return absl::OkStatus();
 }
 
 // Sets state, reasons, validation and verdict of the candidate, validated
@@ -168,8 +189,8 @@ absl::Status Validate(const RunContext& context,
   }
   SELFCAL_ASSIGN_OR_RETURN(evidence.held_out,
                            GatherHeldOut(context, run, rig.rig, result));
-  SELFCAL_ASSIGN_OR_RETURN(evidence.diagnosis,
-                           DiagnoseUsed(context, run, rig.rig, result));
+  SELFCAL_RETURN_IF_ERROR(
+      ExamineUsed(context, run, rig.rig, result, &evidence));
   CandidateValidation validated = ValidateCandidate(rig.rig, result, evidence);
   candidate->verdict = MakeVerdict(rig.rig, result, validated);
   candidate->state = validated.reasons.empty() ? CalibrationState::kActive

@@ -69,10 +69,23 @@ void AddNotMade(const StoredValidation& validation, Sentences* sentences) {
   }
 }
 
+// A check that passed, and yet says that errors may be larger than stated.
+bool IsDoubt(const ValidationCheck& check) {
+  return check.name == "effects" && check.outcome == CheckOutcome::kPassed &&
+         !check.sentence.empty();
+}
+
+void AddDoubts(const StoredValidation& validation, Sentences* sentences) {
+  for (const ValidationCheck& check : validation.checks) {
+    if (IsDoubt(check)) sentences->push_back(check.sentence);
+  }
+}
+
 Sentences Notes(const StoredValidation& validation) {
   Sentences notes;
   for (const ValidationCheck& check : validation.checks) {
-    if (check.outcome == CheckOutcome::kPassed && !check.sentence.empty()) {
+    if (check.outcome == CheckOutcome::kPassed && !check.sentence.empty() &&
+        !IsDoubt(check)) {
       notes.push_back(check.sentence);
     }
   }
@@ -92,6 +105,7 @@ Verdict MakeVerdict(const Rig& rig,
   AddHeld(result, &verdict.sentences);
   AddHardlyLearned(rig, result, limits, &verdict.sentences);
   AddNotMade(validated.validation, &verdict.sentences);
+  AddDoubts(validated.validation, &verdict.sentences);
   verdict.kind =
       verdict.sentences.empty() ? VerdictKind::kGood : VerdictKind::kWeak;
   for (std::string& note : Notes(validated.validation)) {

@@ -16,8 +16,9 @@ namespace selfcal::server {
 //   checks.
 // - Weak if directions were held constant, if the data determines a component
 //   little better than the prior (its sigma is over half the prior's), or if a
-//   check could not be made, each with a sentence. Held-out segments may be
-//   missing if two halves agree.
+//   check could not be made, or if an effect that the rig does not estimate
+//   shifts a component by over its sigma, each with a sentence. Held-out
+//   segments may be missing if two halves agree.
 // - Good otherwise; the notes of the checks are its sentences.
 Verdict MakeVerdict(const Rig& rig,
                     const CalibrationResult& result,

@@ -24,6 +24,7 @@ class CandidateTest : public ::testing::Test {
     active.report = CalibrationResult();
     active.report->rank = 20;
     evidence_.diagnosis = Diagnosis();
+    evidence_.effects.emplace();
     result_.status = CalibrateStatus::kConverged;
     result_.theta = BoxPlus(rig_.factory, 0.5 * prior);
     result_.covariance = active.covariance;

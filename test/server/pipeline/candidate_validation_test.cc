@@ -184,6 +184,26 @@ TEST_F(CandidateTest, SegmentsThatCannotBeReadAreNotTested) {
   EXPECT_EQ(TheVerdict().kind, VerdictKind::kWeak);
 }
 
+TEST_F(CandidateTest, AnEffectThatShiftsItMustBeEstimated) {
+  evidence_.effects = {
+      {{"cam0.time_offset", {90, 1, 1e-20}, 2.1, "cam0.q_CI.x"},
+       {"cam0.line_delay", {70, 1, 1e-16}, 2.4, "cam0.q_CI.y"}}};
+  // The most likely one is named.
+  EXPECT_THAT(Problem("effects"),
+              AllOf(HasSubstr("most likely cam0.time_offset"),
+                    HasSubstr("cam0.q_CI.x by 2.1 sigma"),
+                    HasSubstr("--block 'cam0.time_offset=on'")));
+  evidence_.effects->front().bias_sigmas = 1.9;
+  EXPECT_EQ(OutcomeOf("effects"), CheckOutcome::kPassed);
+  EXPECT_THAT(Check("effects").sentence, HasSubstr("cam0.time_offset"));
+  // What chance may do is no effect.
+  evidence_.effects = {{{"cam0.time_offset", {14, 1, 2e-4}, 9, "cam0.q_CI.x"}}};
+  EXPECT_EQ(OutcomeOf("effects"), CheckOutcome::kPassed);
+  EXPECT_EQ(Check("effects").sentence, "");
+  evidence_.effects.reset();
+  EXPECT_EQ(OutcomeOf("effects"), CheckOutcome::kNotTested);
+}
+
 TEST_F(CandidateTest, ValuesMustLieWithinTenPriorSigmasOfTheFactory) {
   const auto components = TangentComponents(rig_.factory);
   const Eigen::VectorXd prior = PriorSigmas(rig_);

@@ -176,7 +176,7 @@ TEST_F(DeferredRunTest, RunGoesOnFromTheCandidateThatItHasStored) {
   EXPECT_EQ(active->version, 2);
   ASSERT_TRUE(active->validation.has_value());
   EXPECT_EQ(active->validation->active_version, 1);
-  EXPECT_EQ(active->validation->checks.size(), 16u);
+  EXPECT_EQ(active->validation->checks.size(), 17u);
 }
 
 TEST_F(DeferredRunTest, ActivationByHandDuringARunIsWhatItIsJudgedAgainst) {

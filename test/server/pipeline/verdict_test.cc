@@ -22,6 +22,17 @@ TEST_F(CandidateTest, WhatIsHeldOrHardlyLearnedIsWeak) {
               ElementsAre(HasSubstr(TangentComponents(rig_.factory)[5].name)));
 }
 
+TEST_F(CandidateTest, AShiftByWhatIsNotEstimatedIsWeak) {
+  EXPECT_EQ(TheVerdict().kind, VerdictKind::kGood);
+  evidence_.effects = {
+      {{"cam0.time_offset", {90, 1, 1e-20}, 1.6, "cam0.q_CI.x"}}};
+  EXPECT_EQ(TheVerdict().kind, VerdictKind::kWeak);
+  EXPECT_THAT(TheVerdict().sentences,
+              ElementsAre(HasSubstr("cam0.time_offset")));
+  evidence_.effects->front().bias_sigmas = 0.9;
+  EXPECT_EQ(TheVerdict().kind, VerdictKind::kGood);
+}
+
 TEST_F(CandidateTest, TheVerdictOnWhatIsRejectedIsTheReasons) {
   result_.rank = 3;
   EXPECT_EQ(TheVerdict().kind, VerdictKind::kNotTrustworthy);
