@@ -124,10 +124,8 @@ class Driver {
   // waits for another segment: none where the tables have not changed.
   void EndSession() {
     const auto begin = std::chrono::steady_clock::now();
-    const auto run = pipeline_->StartRecalibration(name_);
-    if (!run.ok() && !absl::IsFailedPrecondition(run.status())) {
-      Check(run.status());
-    }
+    Check(domain_->StartSessionRuns({name_}, 0).status());
+    pipeline_->EndSession(name_);
     WaitUntilIdle();
     outcome_.pipeline_seconds +=
         Seconds(std::chrono::steady_clock::now() - begin);

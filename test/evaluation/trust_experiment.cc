@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/pipeline/verdict.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/statistics.h"
 #include "test/evaluation/trust_device.h"
@@ -215,11 +216,14 @@ std::string StateOf(const TrustVersion& version) {
              : "other";
 }
 
-// The variance between segments over that which noise explains, if tested.
-Cell Disagreement(const server::StoredCalibration& stored) {
+// The value of a check that was made.
+Cell ValueOf(const server::StoredCalibration& stored, const char* name) {
   if (!stored.validation) return {};
   for (const server::ValidationCheck& check : stored.validation->checks) {
-    if (check.name == "disagreement" && check.value > 0) return check.value;
+    if (check.name == name &&
+        check.outcome != server::CheckOutcome::kNotTested) {
+      return check.value;
+    }
   }
   return {};
 }
@@ -242,7 +246,12 @@ void WriteVersions(const std::vector<Trial>& trials, Context* context) {
                                       "observations",
                                       "dropped",
                                       "rms [px]",
-                                      "disagreement"};
+                                      "disagreement",
+                                      "bias by effects [sigma]",
+                                      "verdict",
+                                      "remembered",
+                                      "contradicting",
+                                      "unused"};
   for (int i = 0; i < kNoiseKinds; ++i) {
     columns.push_back(NoiseKindName(static_cast<NoiseKind>(i)) + " / truth");
   }
@@ -276,7 +285,12 @@ void WriteVersions(const std::vector<Trial>& trials, Context* context) {
                                static_cast<long>(r.observations),
                                static_cast<long>(r.observations_dropped),
                                r.reprojection_rms_after_px,
-                               Disagreement(stored)};
+                               ValueOf(stored, "disagreement"),
+                               ValueOf(stored, "effects"),
+                               server::VerdictText(stored.verdict.kind),
+                               static_cast<long>(r.remembered.segments),
+                               static_cast<long>(r.remembered.contradicting),
+                               r.remembered.unused};
       AddNoise(trial, report, &row);
       row.push_back(stored.seconds);
       row.push_back(fmt::format("{}", fmt::join(stored.reasons, "; ")));
@@ -431,17 +445,16 @@ void ReportKinds(const std::vector<Trial>& trials, Context* context) {
 }
 
 void ReportAll(const std::vector<Trial>& trials, Context* context) {
-  int active = 0, unlikely = 0, failures = 0;
+  int active = 0, unlikely = 0;
   for (const Trial& trial : trials) {
-    for (const TrustVersion& version : trial.outcome.versions) {
-      failures += IsSilentFailure(version);
-    }
     if (!trial.outcome.final_error) continue;
     ++active;
     unlikely += trial.outcome.final_error->probability < kUnlikely;
   }
-  context->AtMost(
-      "trust.silent_failures", failures, 0, {.unit = "active versions"});
+  context->AtMost("trust.silent_failures",
+                  std::count_if(trials.begin(), trials.end(), HasFailed),
+                  0,
+                  {.unit = "devices"});
   if (active > 0) {
     context->AtMost("trust.beyond_99_percent",
                     unlikely,

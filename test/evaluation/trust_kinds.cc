@@ -11,6 +11,7 @@ const std::vector<TrustKind>& TrustKinds() {
                       NoiseKinds,
                       CorruptionKinds,
                       ChangeKinds,
+                      ModelKinds,
                       RecordedKinds}) {
       std::vector<TrustKind> some = part();
       kinds.insert(kinds.end(),

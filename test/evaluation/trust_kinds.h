@@ -45,6 +45,7 @@ std::vector<TrustKind> MotionKinds();      // trust_motion_kinds.cc
 std::vector<TrustKind> NoiseKinds();       // trust_noise_kinds.cc
 std::vector<TrustKind> CorruptionKinds();  // trust_corruption_kinds.cc
 std::vector<TrustKind> ChangeKinds();      // trust_change_kinds.cc
+std::vector<TrustKind> ModelKinds();       // trust_model_kinds.cc
 std::vector<TrustKind> RecordedKinds();    // trust_recorded_kinds.cc
 
 }  // namespace selfcal
