@@ -536,7 +536,8 @@ int32_t selfcal_calibration_at_temperature(
 // NULL is ignored.
 void selfcal_calibration_destroy(selfcal_calibration* calibration);
 
-// Number of the version, from 1 (the factory calibration); 0 for NULL.
+// Number of the version, from 1 (the factory calibration); 0 for NULL, and for
+// a calibration that was made from values.
 int64_t selfcal_calibration_version(const selfcal_calibration* calibration);
 // 0 for NULL.
 int32_t selfcal_calibration_camera_count(
@@ -597,10 +598,11 @@ int32_t selfcal_calibration_correct_imu_dw(
     double f_I[3],
     selfcal_error* error);
 // For a filter that exchanges its calibration while it runs: changes its biases
-// b_g [rad/s, in I] and b_a [m/s^2, in A] so that readings at rest mean under
-// `to` what they have meant under `from`, where f_I is the specific force at
-// rest: (0, 0, g), rotated from G to I. Biases take up what a calibration gets
-// wrong; a filter would have to learn them again.
+// b_g [rad/s, in I] and b_a [m/s^2, in A] so that readings at rest give the
+// same rate and force under `to` as under `from`. f_I is the specific force at
+// rest: (0, 0, g), rotated from G to I. Biases absorb what is wrong in a
+// calibration: with those of `from`, a filter would have to estimate them
+// again.
 int32_t selfcal_calibration_carry_biases(const selfcal_calibration* from,
                                          const selfcal_calibration* to,
                                          const double f_I[3],

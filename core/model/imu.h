@@ -39,10 +39,10 @@ struct ImuBiases {
   Eigen::Vector3d b_a;  // [m/s^2], in A
 };
 
-// Biases for a filter that exchanges its calibration while it runs: those with
-// which readings at rest mean under `to` what they have meant under `from`,
-// where f_I is the specific force at rest (R_IG (0, 0, g)). Biases take up what
-// a calibration gets wrong: without this, a filter would have to learn them
+// Biases for a filter that exchanges its calibration while it runs: with them,
+// readings at rest give the same rate and force under `to` as under `from`. f_I
+// is the specific force at rest (R_IG (0, 0, g)). Biases absorb what is wrong
+// in a calibration: with those of `from`, a filter would have to estimate them
 // again.
 ImuBiases CarryBiases(const ImuCalibration& from,
                       const ImuCalibration& to,

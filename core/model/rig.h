@@ -46,8 +46,8 @@ bool IsEstimated(const std::vector<BlockSetting>& settings,
 // The three groups of the paper: "imu", "camera" (f, c, distortion of every
 // camera) and "extrinsics" (q_CI, p_CI of every camera); "imu1" (intrinsics and
 // pose of a second IMU), apart from the first one, since a segment may excite
-// one of them and saturate the other; and "time" (the time offset of every
-// camera, and the line delay of each with a rolling shutter).
+// one of them and saturate the other; and "time" (of every camera the time
+// offset and its slope, the line delay and the time drift).
 // Only those of which a block is estimated, in a rig with this number of
 // cameras without optional blocks.
 std::vector<ParameterGroup> DefaultGroups(
