@@ -86,8 +86,8 @@ inline constexpr double kImuPadding_s = 0.15;
 
 struct MotionSegment {
   SegmentKey key;
-  // Version of the calibration with which the SLAM system estimated the states;
-  // it is also the linearisation point.
+  // Version of the calibration with which the SLAM system estimated the states.
+  // The daemon scores at its active version.
   std::int64_t calibration_version = 1;
   std::vector<KeyframeState> keyframes;  // strictly increasing in time
   // Strictly increasing in time, from at or before the first keyframe to at or

@@ -18,7 +18,7 @@ struct Transition {
   CalibrationState to;
 };
 
-// The same as in migrations/0004_lifecycle.sql.
+// The same as in migrations/sqlite/0004_lifecycle.sql.
 constexpr Transition kTransitions[] = {
     {CalibrationState::kCandidate, CalibrationState::kActive},
     {CalibrationState::kCandidate, CalibrationState::kRejected},

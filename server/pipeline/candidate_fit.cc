@@ -147,8 +147,9 @@ std::string NoiseFailure(const CheckContext& context, const NoiseScale& scale) {
   if (Contradicts(scale, limits.max_noise_ratio)) {
     return fmt::format(
         "The {} noise is {:.2f} times what the rig states (+- {:.0f} %), and "
-        "{:.2f} times was used: the sigmas are too small. Correct the noise "
-        "of the rig, or let it be estimated.",
+        "{:.2f} times was used: the sigmas are too small. Compare the noise "
+        "that the rig states with the data sheet; it cannot change, so that a "
+        "wrong one needs a new rig.",
         NoiseKindName(scale.kind),
         scale.factor,
         100 * scale.log_sigma,

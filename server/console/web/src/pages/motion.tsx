@@ -214,15 +214,15 @@ function Choices(props: {
   imu: number;
   onImu: (imu: number) => void;
 }) {
-  const scored = props.segment.calibrationVersion;
+  const stated = props.segment.calibrationVersion;
   return (
     <div class="bar">
       <Choice
         label="Residuals at"
         value={props.version}
         of={[
-          [scored, `version ${scored}, used for its score`],
-          ...(props.active && props.active !== scored
+          [stated, `version ${stated}, of the SLAM system`],
+          ...(props.active && props.active !== stated
             ? [[props.active, `version ${props.active}, active`] as [string, string]]
             : []),
         ]}
