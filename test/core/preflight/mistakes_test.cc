@@ -3,9 +3,12 @@
 #include "test/core/preflight/mistakes.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "core/simulation/simulate.h"
 #include "test/core/preflight/expect_found.h"
@@ -156,6 +159,77 @@ TEST(Mistakes, ClocksThatDriftAreFoundWhereTheSlamSystemIgnoresIt) {
                          truth,
                          SimulateApart(stated, truth, 6, 60, {.seed = 7}))
                     .findings.empty());
+  }
+}
+
+// Segments a minute apart of a session in which the SLAM system takes over a
+// version: `before` segments with version 1, whose constant offset is that of
+// the rig, then `after` with version 2, whose offset is larger by step_s.
+std::vector<MotionSegment> SimulateTakeover(const Calibration& truth,
+                                            int before,
+                                            int after,
+                                            double step_s) {
+  std::vector<MotionSegment> all;
+  Rig rig = HandheldRig("rig");
+  const auto add = [&](std::int64_t version, int first, int count) {
+    for (MotionSegment& segment :
+         SimulateSingly(rig,
+                        truth,
+                        count,
+                        {.seed = 7 + static_cast<std::uint64_t>(version)},
+                        [&](int i, SimulationOptions*own) {
+                          own->session_age_s = 60.0 * (first + i);
+                        })) {
+      segment.calibration_version = version;
+      all.push_back(std::move(segment));
+    }
+  };
+  add(1, 0, before);
+  rig.factory.cameras[0].time_offset_s += step_s;
+  add(2, before, after);
+  return all;
+}
+
+bool FindsDrift(const Diagnosis& diagnosis) {
+  const auto kinds = Kinds(diagnosis);
+  return std::ranges::count(kinds, FindingKind::kClockDrift) > 0;
+}
+
+// States are late until the SLAM system knows the offset, and no longer after:
+// over the time of the session that looks like a line.
+TEST(Mistakes, AnOffsetThatTheSlamSystemTakesOverIsNoDriftOfClocks) {
+  for (const double step_s : {-0.03, 0.02}) {
+    Calibration truth = HandheldRig("rig").factory;
+    truth.cameras[0].time_offset_s = step_s;
+    for (const auto& [before, after] : {std::pair(12, 12),
+                                        std::pair(8, 2),
+                                        std::pair(3, 1),
+                                        std::pair(2, 2),
+                                        std::pair(1, 2)}) {
+      const auto segments = SimulateTakeover(truth, before, after, step_s);
+      const Diagnosis diagnosis = Diagnose(HandheldRig("rig"), truth, segments);
+      EXPECT_FALSE(FindsDrift(diagnosis))
+          << before << " segments before, " << after << " after\n"
+          << Text(diagnosis);
+    }
+  }
+}
+
+TEST(Mistakes, ClocksThatDriftAreFoundAcrossVersions) {
+  const Rig rig = HandheldRig("rig");
+  for (const double drift : {-1e-4, 3e-5}) {
+    Calibration truth = rig.factory;
+    truth.cameras[0].time_offset_s = 0.02;
+    truth.cameras[0].time_drift = drift;
+    for (const auto& [before, after] :
+         {std::pair(6, 6), std::pair(6, 1), std::pair(1, 6)}) {
+      const auto segments = SimulateTakeover(truth, before, after, 0.02);
+      const Diagnosis diagnosis = Diagnose(rig, rig.factory, segments);
+      ASSERT_TRUE(FindsDrift(diagnosis)) << Text(diagnosis);
+      const auto found = std::ranges::find(
+          diagnosis.findings, FindingKind::kClockDrift, &Finding::kind);
+      EXPECT_NEAR(found->value, drift, 0.1 * std::abs(drift));
+    }
   }
 }
 
