@@ -174,6 +174,24 @@ inline Calibration CalibrationOf(const ov_msckf::State& state) {
   return Calibration(imu, cameras);
 }
 
+// Empty, or what of the calibration asks more of each segment than this adapter
+// sends: without it, the daemon would refuse all of them.
+inline std::string NotSent(const Calibration& calibration) {
+  for (const selfcal_component& component : calibration.components()) {
+    const std::string name = component.name;
+    if (name.rfind("imu1.", 0) == 0) {
+      return "the rig has a second IMU, whose readings the adapter does not "
+             "send";
+    }
+    if (name.find("_slope") != std::string::npos) {
+      return "the calibration depends on the temperature, which the adapter "
+             "does not send (" +
+             name + ")";
+    }
+  }
+  return "";
+}
+
 // Empty, or what of the calibration the filter cannot use.
 inline std::string NotExpressible(const Calibration& calibration,
                                   const ov_msckf::State& state) {
@@ -183,6 +201,8 @@ inline std::string NotExpressible(const Calibration& calibration,
   if (calibration.imu().accel_position_size > 0) {
     return "OpenVINS has no position of the accelerometer";
   }
+  const std::string not_sent = NotSent(calibration);
+  if (!not_sent.empty()) return not_sent;
   if (calibration.camera_count() != state._options.num_cameras) {
     return "the rig has another number of cameras";
   }
