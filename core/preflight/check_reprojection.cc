@@ -207,7 +207,8 @@ class ReprojectionCheck {
                     camera_,
                     [&](const View& v) {
                       const CameraCalibration& c = cameras_[of(v)];
-                      return v.first.ToG(c.q_CI.conjugate() * (v.p - c.p_CI));
+                      return v.first_exposure.ToG(c.q_CI.conjugate() *
+                                                  (v.p - c.p_CI));
                     }),
             {FindingKind::kLandmarkFrame,
              "landmarks are in the camera frame" + which +
@@ -358,12 +359,13 @@ class FindingsByCamera {
 void CheckReprojection(const Rig& rig,
                        const Calibration& theta,
                        std::span<const MotionSegment> segments,
+                       std::span<const double> late_s,
                        Diagnosis* diagnosis) {
   const auto cameras = static_cast<int>(theta.cameras.size());
   FindingsByCamera findings;
   for (int j = 0; j < cameras; ++j) {
     const std::string name = "cam" + std::to_string(j);
-    const auto views = CollectViews(segments, j, cameras);
+    const auto views = CollectViews(rig, theta, segments, late_s, j);
     if (views.size() < kMinViews) {
       diagnosis->not_checked.push_back(
           name + ": extrinsics, focal length and landmarks: only " +

@@ -16,6 +16,7 @@
 #include "core/factor/reprojection.h"
 #include "core/model/median.h"
 #include "core/preflight/checks.h"
+#include "core/preflight/exposure_poses.h"
 
 namespace selfcal {
 namespace {
@@ -78,10 +79,11 @@ class RowCollector {
   RowCollector(const Rig& rig, const Calibration& theta, int camera)
       : rig_(rig), theta_(theta), camera_(camera) {}
 
-  void Add(const MotionSegment& segment) {
+  void Add(const MotionSegment& segment, double late_s) {
     KeyframeMotions motions;
+    const Calibration theta = FromStates(theta_, late_s);
     motions.Measure(rig_,
-                    theta_,
+                    theta,
                     std::vector<char>(theta_.cameras.size(), 1),
                     segment.keyframes,
                     [&](std::size_t k) { return ContextOf(segment, k); });
@@ -90,7 +92,9 @@ class RowCollector {
     for (const Observation& o : segment.observations) {
       if (o.camera == camera_) tracks[o.landmark].push_back(&o);
     }
-    for (const auto& seen : tracks) AddTrack(segment, motions, seen);
+    for (const auto& seen : tracks) {
+      AddTrack(segment, theta.cameras[camera_], motions, seen);
+    }
     keyframes_ += static_cast<int>(segment.keyframes.size());
   }
 
@@ -99,9 +103,9 @@ class RowCollector {
 
  private:
   void AddTrack(const MotionSegment& segment,
+                const CameraCalibration& camera,
                 const KeyframeMotions& motions,
                 const std::vector<const Observation*>& seen) {
-    const CameraCalibration& camera = theta_.cameras[camera_];
     const int time = kCameraIntrinsics + camera.IntrinsicsSize();
     Track track;
     Eigen::MatrixX3d by_position(2 * seen.size(), 3);
@@ -205,14 +209,16 @@ void Report(const CameraCalibration& camera,
 void CheckShutter(const Rig& rig,
                   const Calibration& theta,
                   std::span<const MotionSegment> segments,
+                  std::span<const double> late_s,
                   Diagnosis* diagnosis) {
   std::size_t seen = 0;
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
     const CameraCalibration& camera = theta.cameras[j];
     if (camera.line_delay_s) continue;
     RowCollector collector(rig, theta, static_cast<int>(j));
-    for (const MotionSegment& segment : segments) {
-      if (Validate(segment, theta).empty()) collector.Add(segment);
+    for (std::size_t s = 0; s < segments.size(); ++s) {
+      if (!Validate(segments[s], theta).empty()) continue;
+      collector.Add(segments[s], late_s[s]);
     }
     const std::vector<Row>& rows = collector.rows();
     if (rows.size() < kMinSeen || collector.keyframes() < kMinKeyframes) {

@@ -59,10 +59,12 @@ void CheckSecondImu(const Rig& rig,
                     bool first_is_right,
                     Diagnosis* diagnosis);
 
-// Extrinsics, intrinsics and the frame of the landmarks.
+// Extrinsics, intrinsics and the frame of the landmarks. `late_s` are those of
+// FindLateStates.
 void CheckReprojection(const Rig& rig,
                        const Calibration& theta,
                        std::span<const MotionSegment> segments,
+                       std::span<const double> late_s,
                        Diagnosis* diagnosis);
 
 // Rows of images that were exposed one after the other, by cameras whose
@@ -70,6 +72,7 @@ void CheckReprojection(const Rig& rig,
 void CheckShutter(const Rig& rig,
                   const Calibration& theta,
                   std::span<const MotionSegment> segments,
+                  std::span<const double> late_s,
                   Diagnosis* diagnosis);
 
 }  // namespace selfcal

@@ -7,6 +7,7 @@
 #include "core/model/median.h"
 #include "core/model/temperature.h"
 #include "core/preflight/checks.h"
+#include "core/preflight/late_states.h"
 #include "core/preflight/motion_data.h"
 
 namespace selfcal {
@@ -98,9 +99,10 @@ Diagnosis Diagnose(const Rig& rig,
     CheckSecondImu(
         rig, theta, segments, gyro, LeavesMotion(diagnosis), &diagnosis);
   }
-  CheckReprojection(rig, theta, segments, &diagnosis);
+  const auto late_s = FindLateStates(rig, theta, segments);
+  CheckReprojection(rig, theta, segments, late_s, &diagnosis);
   if (LeavesMotion(diagnosis)) {
-    CheckShutter(rig, theta, segments, &diagnosis);
+    CheckShutter(rig, theta, segments, late_s, &diagnosis);
   } else {
     diagnosis.not_checked.push_back("shutter: not before the above is correct");
   }

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <compare>
 #include <cstddef>
-#include <cstdint>
-#include <limits>
+#include <utility>
 
 #include "core/model/median.h"
 
@@ -14,36 +12,18 @@ namespace {
 
 constexpr std::size_t kMaxViews = 4000;
 
-bool Usable(const MotionSegment& segment, const Observation& o) {
-  const auto within = [](std::int32_t i, std::size_t size) {
-    return i >= 0 && static_cast<std::size_t>(i) < size;
-  };
-  if (!within(o.keyframe, segment.keyframes.size())) return false;
-  if (!within(o.landmark, segment.landmarks.size())) return false;
-  const KeyframeState& k = segment.keyframes[o.keyframe];
-  return o.z_px.allFinite() && k.p_GI.allFinite() &&
-         k.q_GI.coeffs().allFinite() && k.q_GI.norm() > 0.5 &&
-         segment.landmarks[o.landmark].p_G.allFinite();
-}
-
-BodyPose PoseOf(const KeyframeState& state) {
-  return {state.q_GI.normalized(), state.p_GI};
-}
-
-struct Sighting {
-  std::int32_t keyframe = std::numeric_limits<std::int32_t>::max();
-  std::int32_t camera = 0;
-  auto operator<=>(const Sighting&) const = default;
-};
+using First = const Observation*;
 
 // First observation of each landmark.
-std::vector<Sighting> FirstSightings(const MotionSegment& segment,
-                                     int cameras) {
-  std::vector<Sighting> first(segment.landmarks.size());
+std::vector<First> FirstSightings(const MotionSegment& segment, int cameras) {
+  const auto order = [](const Observation& o) {
+    return std::pair(o.keyframe, o.camera);
+  };
+  std::vector<First> first(segment.landmarks.size(), nullptr);
   for (const Observation& o : segment.observations) {
-    if (o.camera < 0 || o.camera >= cameras || !Usable(segment, o)) continue;
-    first[o.landmark] =
-        std::min(first[o.landmark], Sighting{o.keyframe, o.camera});
+    if (o.camera < 0 || o.camera >= cameras || !IsUsable(segment, o)) continue;
+    First& of = first[o.landmark];
+    if (of == nullptr || order(o) < order(*of)) of = &o;
   }
   return first;
 }
@@ -60,20 +40,27 @@ std::size_t CountOf(std::span<const MotionSegment> segments, int camera) {
 
 }  // namespace
 
-std::vector<View> CollectViews(std::span<const MotionSegment> segments,
-                               int camera,
-                               int cameras) {
+std::vector<View> CollectViews(const Rig& rig,
+                               const Calibration& theta,
+                               std::span<const MotionSegment> segments,
+                               std::span<const double> late_s,
+                               int camera) {
+  const auto cameras = static_cast<int>(theta.cameras.size());
   const std::size_t step = CountOf(segments, camera) / kMaxViews + 1;
   std::vector<View> views;
   std::size_t count = 0;
-  for (const MotionSegment& segment : segments) {
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    const MotionSegment& segment = segments[s];
+    const ExposurePoses poses(rig, theta, segment, late_s[s]);
     const auto first = FirstSightings(segment, cameras);
     for (const Observation& o : segment.observations) {
-      if (o.camera != camera || !Usable(segment, o)) continue;
+      if (o.camera != camera || !IsUsable(segment, o)) continue;
       if (count++ % step != 0) continue;
-      views.push_back({PoseOf(segment.keyframes[o.keyframe]),
-                       PoseOf(segment.keyframes[first[o.landmark].keyframe]),
-                       first[o.landmark].camera,
+      const Observation& sighting = *first[o.landmark];
+      views.push_back({poses.At(o),
+                       PoseOf(segment.keyframes[sighting.keyframe]),
+                       poses.At(sighting),
+                       sighting.camera,
                        segment.landmarks[o.landmark].p_G,
                        o.z_px});
     }
@@ -90,6 +77,13 @@ std::optional<Eigen::Vector2d> Predict(const CameraCalibration& camera,
     return std::nullopt;
   }
   return z_px;
+}
+
+double ErrorOf(const View& view,
+               const CameraCalibration& camera,
+               const Eigen::Vector3d& p_G) {
+  const auto z_px = Predict(camera, view.pose, p_G);
+  return z_px ? (*z_px - view.z_px).norm() : HUGE_VAL;
 }
 
 ReprojectionError Summarise(std::vector<double> errors_px) {

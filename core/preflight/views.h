@@ -3,47 +3,49 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <cmath>
 #include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "core/model/calibration.h"
 #include "core/model/camera.h"
+#include "core/model/rig.h"
 #include "core/model/segment.h"
+#include "core/preflight/exposure_poses.h"
 
 namespace selfcal {
 
-struct BodyPose {
-  Eigen::Quaterniond q_GI;
-  Eigen::Vector3d p_GI;
-
-  Eigen::Vector3d ToG(const Eigen::Vector3d& p_I) const {
-    return q_GI * p_I + p_GI;
-  }
-};
-
 struct View {
-  BodyPose pose;  // of the observing keyframe
-  // Pose of the first keyframe of the segment that observed the landmark, with
-  // any camera, and the camera that did.
+  BodyPose pose;  // at the exposure of the pixel
+  // The first keyframe of the segment that observed the landmark, with any
+  // camera: its pose, that at the exposure, and the camera.
   BodyPose first;
+  BodyPose first_exposure;
   int first_camera;
   Eigen::Vector3d p;  // position of the landmark as received
   Eigen::Vector2d z_px;
 };
 
 // An even subsample of about 4000 observations of `camera`, without invalid
-// numbers or indices; there are `cameras` in all.
-std::vector<View> CollectViews(std::span<const MotionSegment> segments,
-                               int camera,
-                               int cameras);
+// numbers or indices. The states of each segment hold later than their stamps
+// by that of late_s.
+std::vector<View> CollectViews(const Rig& rig,
+                               const Calibration& theta,
+                               std::span<const MotionSegment> segments,
+                               std::span<const double> late_s,
+                               int camera);
 
 // Pixel of a point in G; nullopt if it cannot be projected.
 std::optional<Eigen::Vector2d> Predict(const CameraCalibration& camera,
                                        const BodyPose& pose,
                                        const Eigen::Vector3d& p_G);
+
+// Distance of the pixel from that of a point in G; infinite if it cannot be
+// projected.
+double ErrorOf(const View& view,
+               const CameraCalibration& camera,
+               const Eigen::Vector3d& p_G);
 
 // Error of predicted views: one that cannot be projected is treated as
 // infinitely far away.
@@ -62,8 +64,7 @@ ReprojectionError Measure(const std::vector<View>& views,
   std::vector<double> errors;
   errors.reserve(views.size());
   for (const View& view : views) {
-    const auto z = Predict(camera, view.pose, place(view));
-    errors.push_back(z ? (*z - view.z_px).norm() : HUGE_VAL);
+    errors.push_back(ErrorOf(view, camera, place(view)));
   }
   return Summarise(std::move(errors));
 }

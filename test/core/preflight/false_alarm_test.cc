@@ -58,6 +58,7 @@ TEST(CleanData, GivesNoFinding) {
   const Case cases[] = {
       {"hand-held", HandheldRig("a"), false, 0},
       {"hand-held, offset of 15 ms", HandheldRig("a"), false, 0.015},
+      {"hand-held, offset of 100 ms", HandheldRig("a"), false, 0.1},
       {"hand-held, true calibration stated", HandheldRig("a"), true, 0},
       {"stereo", StereoRig(), false, 0},
       {"four cameras", RigOfCameras(4), false, 0}};
