@@ -221,7 +221,7 @@ ExportedFiles ExportCameraInfo(const Rig& rig,
   std::vector<CameraCalibration> cameras = theta.cameras;
   UseModelsOf(kCameraInfo, &cameras);
   ExportedFiles result;
-  AddPinholeLosses(kCameraInfo, cameras, &result.losses, kEquidistant);
+  AddPinholeLosses(kCameraInfo, cameras, &result.losses, {kEquidistant});
   for (std::size_t j = 0; j < cameras.size(); ++j) {
     const std::string name = fmt::format("cam{}", j);
     AddPoseLoss(cameras[j], name, &result.losses);

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <type_traits>
 
@@ -44,6 +45,43 @@ std::vector<std::string_view> Corrections(const ImuCalibration& imu) {
 
 bool Contains(std::span<const std::string_view> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// The last ray on the line from one pixel to another; nullopt if it has none.
+std::optional<Eigen::Vector3d> LastRay(const CameraCalibration& camera,
+                                       const Eigen::Vector2d& from_px,
+                                       const Eigen::Vector2d& to_px) {
+  constexpr int kHalvings = 30;
+  std::optional<Eigen::Vector3d> last;
+  const auto try_at = [&](double part) {
+    Eigen::Vector3d bearing_C;
+    const Eigen::Vector2d z_px = from_px + part * (to_px - from_px);
+    if (!Unproject(camera, z_px, &bearing_C)) return false;
+    last = bearing_C;
+    return true;
+  };
+  if (try_at(1)) return last;
+  double begin = 0, end = 1;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = (begin + end) / 2;
+    (try_at(middle) ? begin : end) = middle;
+  }
+  return last;
+}
+
+// Rays are furthest from the axis at the corners of the image, at the points of
+// its border that are nearest to the principal point, or, where a fish-eye's
+// circle ends within the image, on the way there.
+bool ShowsRaysBeyond90Degrees(const CameraCalibration& camera) {
+  const Eigen::Vector2d size(camera.width_px, camera.height_px);
+  const Eigen::Vector2d c = camera.c.cwiseMax(0).cwiseMin(size);
+  for (const double x : {0.0, c.x(), size.x()}) {
+    for (const double y : {0.0, c.y(), size.y()}) {
+      const auto ray_C = LastRay(camera, c, {x, y});
+      if (ray_C && !(ray_C->z() > 0)) return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace
@@ -148,26 +186,17 @@ void AddTimeDriftLosses(const std::string& tool,
 void AddPinholeLosses(const std::string& tool,
                       const std::vector<CameraCalibration>& cameras,
                       std::vector<Loss>* losses,
-                      std::string_view pinhole) {
+                      std::initializer_list<std::string_view> pinholes) {
   for (std::size_t j = 0; j < cameras.size(); ++j) {
     const CameraCalibration& camera = cameras[j];
-    if (FindToolModel(tool, camera.model)->name != pinhole) continue;
-    const auto beyond = [&](double x, double y) {
-      Eigen::Vector3d bearing_C;
-      return Unproject(camera, {x, y}, &bearing_C) && !(bearing_C.z() > 0);
-    };
-    const double right = camera.width_px, bottom = camera.height_px;
-    const Eigen::Vector2d& c = camera.c;
-    if (!beyond(0, 0) && !beyond(right, 0) && !beyond(0, bottom) &&
-        !beyond(right, bottom) && !beyond(0, c.y()) && !beyond(right, c.y()) &&
-        !beyond(c.x(), 0) && !beyond(c.x(), bottom)) {
+    if (!Contains(pinholes, FindToolModel(tool, camera.model)->name) ||
+        !ShowsRaysBeyond90Degrees(camera)) {
       continue;
     }
     losses->push_back(
         {fmt::format("cam{}.distortion", j),
-         fmt::format("{} has this model as a pinhole, without the pixels of "
-                     "rays at 90 degrees from the axis or beyond, which this "
-                     "image shows",
+         fmt::format("{} uses this model without the pixels of rays at 90 "
+                     "degrees from the axis or beyond, which this image shows",
                      tool),
          true});
   }

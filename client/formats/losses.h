@@ -58,14 +58,15 @@ void KeepCameras(const std::string& tool,
                  Calibration* theta,
                  std::vector<Loss>* losses);
 
-// For tools that write some models as a pinhole, which has no pixel for a ray
-// at 90 degrees from the axis or beyond: cameras whose image shows such rays.
-// `pinhole` is the tool's name of these models. Cameras are of models that the
-// tool has.
+// For tools that use some models without the pixels of rays at 90 degrees from
+// the axis or beyond, as a pinhole has none: cameras whose image shows such
+// rays. `pinholes` are the tool's names of these models. Cameras are of models
+// that the tool has.
 void AddPinholeLosses(const std::string& tool,
                       const std::vector<CameraCalibration>& cameras,
                       std::vector<Loss>* losses,
-                      std::string_view pinhole = "pinhole");
+                      std::initializer_list<std::string_view> pinholes = {
+                          "pinhole"});
 
 // Returns the given rate, or a usual one, which is then stated in the losses.
 double ImuRate(const FormatOptions& options,

@@ -166,6 +166,8 @@ ExportedFiles ExportOrbSlam3(const Rig& rig,
   text += "IMU.T_b_c1: " + OpenCvMatrixText(T_BC1, 'f');
   text += NoiseText(rig.imu_noise,
                     ImuRate(options, "IMU.Frequency", &result.losses));
+  // Its inverse takes larger angles for 90 degrees.
+  AddPinholeLosses("orb_slam3", cameras, &result.losses, {kFisheye});
   AddImuLoss("orb_slam3", theta.imu, &result.losses);
   AddTimeOffsetLosses("orb_slam3", kept, &result.losses);
   AddLineDelayLosses("orb_slam3", kept, &result.losses);

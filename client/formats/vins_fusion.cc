@@ -194,6 +194,9 @@ ExportedFiles ExportVinsFusion(const Rig& rig,
     text += fmt::format("body_T_cam{}: {}", j, OpenCvMatrixText(T_BC, 'd'));
     cameras.push_back({name, CameraText(kept.cameras[j])});
   }
+  // Its tracker divides rays by their distance along the axis.
+  AddPinholeLosses(
+      "vins_fusion", kept.cameras, &result.losses, {"KANNALA_BRANDT", "MEI"});
   AddImuLoss("vins_fusion", theta.imu, &result.losses);
   AddSharedOffsetLosses("vins_fusion", kept, &result.losses);
   AddLineDelayLosses("vins_fusion", kept, &result.losses);
