@@ -77,10 +77,25 @@ void AddPositionsLoss(const std::string& name,
        true});
 }
 
+// Kalibr's gyroscope is sensitive to the force at the origin of the IMU,
+// selfcal's to the force that the accelerometer reads where it is.
+void AddSensitivityLoss(const std::string& imu,
+                        const ImuMatrices& matrices,
+                        std::vector<Loss>* losses) {
+  if (matrices.G_f.isZero(0) || matrices.r.isZero(0)) return;
+  losses->push_back(
+      {imu + ".gyro.g_sensitivity",
+       "kalibr's is one to the force at the origin of the IMU, selfcal's to "
+       "that at the position of the accelerometer: rates differ when the "
+       "device turns fast",
+       true});
+}
+
 // Reads an IMU's matrices; without them, readings are used as they are. A
-// result of the model "calibrated" repeats those of its input, unused. Names of
-// losses begin with `prefix`.
-ImuMatrices ReadMatrices(const std::string& prefix,
+// result of the model "calibrated" repeats those of its input, unused. `name`
+// is "imu" or "imu1", and names of losses that are keys begin with `prefix`.
+ImuMatrices ReadMatrices(const std::string& name,
+                         const std::string& prefix,
                          const YAML::Node& imu,
                          std::vector<Loss>* losses) {
   ImuMatrices result{Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};
@@ -100,6 +115,7 @@ ImuMatrices ReadMatrices(const std::string& prefix,
     result.r.col(axis) = GetMatrix(accel, kPositions[axis], 3, 1);
   }
   AddPositionsLoss(prefix + "accelerometers.M", result, losses);
+  AddSensitivityLoss(name, result, losses);
   return result;
 }
 
@@ -108,7 +124,7 @@ void ReadSecondImu(const YAML::Node& imu,
                    const Eigen::Matrix3d& R_IB,
                    ImportedRig* result) {
   const ImuInBody own =
-      FromMatrices(ReadMatrices("imu1.", imu, &result->losses));
+      FromMatrices(ReadMatrices("imu1", "imu1.", imu, &result->losses));
   // J is the frame of its gyroscope, K that of its accelerometer.
   const Eigen::Matrix3d& R_JK = own.R_IB;
   const Eigen::Matrix4d T_KB = Rigid(GetMatrix(imu, "T_i_b", 4, 4), "T_i_b");
@@ -183,6 +199,7 @@ void AddImuLosses(const std::string& name,
                   std::vector<Loss>* losses) {
   if (imu.accel_position.size() > 0) {
     AddPositionsLoss(name + ".accel.position", body.matrices, losses);
+    AddSensitivityLoss(name, body.matrices, losses);
   }
   AddImuBlockLosses(
       "kalibr", {"gyro.g_sensitivity", "accel.position"}, name, imu, losses);
@@ -236,7 +253,7 @@ ImportedRig ImportKalibr(const std::vector<TextFile>& files,
   const FoundImus imus = FindImus(chain, &result.losses);
   result.rig.imu_noise = ReadChainNoise(imus.reference);
   const ImuInBody body =
-      FromMatrices(ReadMatrices("", imus.reference, &result.losses));
+      FromMatrices(ReadMatrices("imu", "", imus.reference, &result.losses));
   result.rig.factory.imu = body.imu;
   if (imus.second) ReadSecondImu(*imus.second, body.R_IB, &result);
   Eigen::Matrix4d T_CB;  // of the previous camera

@@ -515,10 +515,6 @@ TEST(ImportModels, AreTheSmallestThatRepresentTheFile) {
 
 TEST(ImportLosses, HaveAName) {
   for (const Change& change : std::initializer_list<Change>{
-           {"kalibr",
-            "  gyroscopes:",
-            "    rx_i: [0.01, 0, 0]\n  gyroscopes:",
-            "accelerometers.M"},
            {"openvins",
             "timeshift_cam_imu: 0.0056",
             "timeshift_cam_imu: 0.001",
@@ -534,6 +530,15 @@ TEST(ImportLosses, HaveAName) {
     ASSERT_EQ(rig->losses.size(), 1u) << change.answer;
     EXPECT_EQ(rig->losses[0].name, change.answer);
   }
+}
+
+TEST(ImportLosses, OfPositionsInKalibrHaveANameEach) {
+  const auto rig = Changed(
+      {"kalibr", "  gyroscopes:", "    rx_i: [0.01, 0, 0]\n  gyroscopes:", ""});
+  ASSERT_TRUE(rig.ok()) << rig.status();
+  EXPECT_THAT(
+      Names(rig->losses),
+      testing::ElementsAre("accelerometers.M", "imu.gyro.g_sensitivity"));
 }
 
 // Kalibr's result on several IMUs: one file.
