@@ -98,6 +98,30 @@ void AddExtrinsicsLoss(const YAML::Node& root,
   }
 }
 
+// The first sensor of a type, and a loss if there are others: `second` is the
+// name of what is lost.
+YAML::Node FirstSensor(const YAML::Node& root,
+                       const std::string& type,
+                       const std::string& second,
+                       std::vector<Loss>* losses) {
+  std::vector<YAML::Node> found;
+  for (const YAML::Node& sensor : Get(root, "sensors")) {
+    if (GetText(sensor, "sensor_type") == type) found.push_back(sensor);
+  }
+  if (found.empty()) {
+    throw FormatError("there is no sensor of type " + type);
+  }
+  if (found.size() > 1) {
+    losses->push_back({second,
+                       fmt::format("there are {} sensors of type {}, of which "
+                                   "the first is read: omitted",
+                                   found.size(),
+                                   type),
+                       true});
+  }
+  return found.front();
+}
+
 // An id of 32 hexadecimal digits: a hash of the text (FNV-1a).
 std::string SensorId(const std::string& text) {
   std::uint64_t halves[2] = {14695981039346656037ull, 1099511628211ull};
@@ -230,18 +254,10 @@ ImportedRig ImportMaplab(const std::vector<TextFile>& files,
                          const FormatOptions&) {
   if (files.size() != 1) throw FormatError("give one file");
   const YAML::Node root = ParseYaml(files[0]);
-  YAML::Node imu;
-  YAML::Node system;
-  for (const YAML::Node& sensor : Get(root, "sensors")) {
-    const std::string type = GetText(sensor, "sensor_type");
-    if (type == "IMU" && !imu.IsMap()) imu.reset(sensor);
-    if (type == "NCAMERA" && !system.IsMap()) system.reset(sensor);
-  }
-  if (!imu.IsMap()) throw FormatError("there is no sensor of type IMU");
-  if (!system.IsMap()) {
-    throw FormatError("there is no sensor of type NCAMERA");
-  }
   ImportedRig result;
+  const YAML::Node imu = FirstSensor(root, "IMU", "imu1", &result.losses);
+  const YAML::Node system =
+      FirstSensor(root, "NCAMERA", "ncamera1", &result.losses);
   result.rig.imu_noise = ReadNoise(imu);
   result.rig.imu_full_scale = ReadFullScale(imu);
   result.rig.gravity_mps2 = GetDouble(imu, "gravity_magnitude_mps2");

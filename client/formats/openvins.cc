@@ -65,6 +65,13 @@ ImportedRig ImportOpenVins(const std::vector<TextFile>& files,
   const ChainFiles chain = ReadChainFiles(files, 1);
   const YAML::Node& imu = chain.imus.front();
   ImportedRig result;
+  if (chain.imus.size() > 1) {
+    result.losses.push_back({"imu1",
+                             fmt::format("there are {} IMUs, and OpenVINS has "
+                                         "one, the first: omitted",
+                                         chain.imus.size()),
+                             true});
+  }
   result.rig.imu_noise = ReadChainNoise(imu);
   const ImuInBody body = FromMatrices(ReadMatrices(imu));
   result.rig.factory.imu = body.imu;

@@ -562,6 +562,22 @@ TEST(ImportKalibr, ASecondImuIsReadAndAThirdOneIsLost) {
   EXPECT_EQ(three->losses[0].name, "imu2");
 }
 
+TEST(ImportOpenVins, ASecondImuIsLost) {
+  RandomValues random(25);
+  std::vector<TextFile> files = OpenVinsFiles(&random);
+  const auto one = ImportRig("openvins", files, {});
+  ASSERT_TRUE(one.ok()) << one.status();
+  EXPECT_THAT(Names(one->losses), testing::Not(testing::Contains("imu1")));
+  const std::string imu = files[1].text;
+  std::string second = imu.substr(imu.find("imu0:"));
+  files[1].text += second.replace(0, 5, "imu1:");
+  const auto two = ImportRig("openvins", files, {});
+  ASSERT_TRUE(two.ok()) << two.status();
+  ASSERT_THAT(Names(two->losses), testing::Contains("imu1"));
+  EXPECT_TRUE(two->losses[0].changes_prediction);
+  EXPECT_TRUE(BoxMinus(two->rig.factory, one->rig.factory).isZero(0));
+}
+
 // Tracks are in the raw image: its rectification says nothing about them.
 TEST(ImportLosses, RectificationIsNotUsed) {
   for (const Change& change : std::initializer_list<Change>{

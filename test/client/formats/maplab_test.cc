@@ -80,6 +80,22 @@ TEST(ImportMaplab, ReadsNoiseCameraAndInvertsExtrinsics) {
             1e-12);
 }
 
+TEST(ImportMaplab, ASecondImuAndASecondCameraSystemAreLost) {
+  std::string text = kSensors;
+  const std::size_t imu = text.find("  - id: b");
+  const std::size_t system = text.find("  - id: c");
+  text += text.substr(imu, system - imu);
+  text += std::string(kSensors).substr(system);
+  const auto imported = Import(text);
+  ASSERT_TRUE(imported.ok()) << imported.status();
+  EXPECT_EQ(imported->rig.factory.cameras.size(), 1u);
+  EXPECT_THAT(imported->losses,
+              ElementsAre(AllOf(Field(&Loss::name, "imu1"),
+                                Field(&Loss::changes_prediction, true)),
+                          AllOf(Field(&Loss::name, "ncamera1"),
+                                Field(&Loss::changes_prediction, true))));
+}
+
 TEST(ImportMaplab, ReadsTheRangeOfTheImu) {
   const std::string gravity = "    gravity_magnitude_mps2: 9.80\n";
   const auto imported =
