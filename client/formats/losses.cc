@@ -154,7 +154,7 @@ void AddLineDelayLosses(const std::string& tool,
                         std::vector<Loss>* losses) {
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
     const CameraCalibration& camera = theta.cameras[j];
-    if (!camera.line_delay_s) continue;
+    if (camera.line_delay_s.value_or(0) == 0) continue;
     losses->push_back(
         {fmt::format("cam{}.line_delay", j),
          fmt::format("{} exposes all rows of an image at once: add {} s to the "
@@ -171,7 +171,7 @@ void AddTimeDriftLosses(const std::string& tool,
                         std::vector<Loss>* losses) {
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
     const CameraCalibration& camera = theta.cameras[j];
-    if (!camera.time_drift) continue;
+    if (camera.time_drift.value_or(0) == 0) continue;
     losses->push_back(
         {fmt::format("cam{}.time_drift", j),
          fmt::format("{} has a constant time offset, while this one is that of "

@@ -274,6 +274,20 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
   }
 }
 
+TEST_P(Export, DelaysOfZeroAreNoLoss) {
+  RandomValues random(23);
+  Rig rig = RandomRig(GetParam(), &random);
+  for (CameraCalibration& camera : rig.factory.cameras) {
+    camera.line_delay_s = 0;
+    camera.time_drift = 0;
+  }
+  const auto files = ExportRig(GetParam().format, rig, rig.factory, {});
+  ASSERT_TRUE(files.ok()) << files.status();
+  EXPECT_THAT(Names(files->losses),
+              Not(testing::AnyOf(Contains("cam0.line_delay"),
+                                 Contains("cam0.time_drift"))));
+}
+
 TEST_P(Export, SlopesAreNamedAndTheValuesAreThoseOfTheReference) {
   RandomValues random(19);
   Rig rig = RandomRig(GetParam(), &random);
