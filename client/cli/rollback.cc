@@ -1,5 +1,6 @@
 // calibration rollback: makes the version before the active one active again,
-// for all rigs of a filter.
+// for all rigs of a filter. A rig that is rolled back already is left as it is,
+// so that the command can be repeated where it failed for some rigs.
 #include <fmt/format.h>
 #include <google/protobuf/util/time_util.h>
 
@@ -30,6 +31,7 @@ struct Options {
   std::string filter;
   std::string reason;
   std::string since;
+  bool again = false;
   bool dry_run = false;
   bool yes = false;
 };
@@ -40,29 +42,64 @@ struct Rollback {
   v1::Calibration to = {};
 };
 
-// The rollback of a rig whose active version was created at or after `since`;
-// nullopt if there is nothing to roll back.
-grpc::Status Plan(CalibrationService* stub,
+// The versions of a rig that a rollback depends on; 0: there is none.
+struct Versions {
+  std::int64_t active = 0;  // if it was created at or after the given time
+  std::int64_t undone = 0;  // newer than the active one, and rolled back
+  v1::Calibration before;   // was active before the active one
+};
+
+grpc::Status Read(CalibrationService* stub,
                   const std::string& rig,
                   const std::optional<google::protobuf::Timestamp>& since,
-                  std::optional<Rollback>* plan) {
+                  bool details,
+                  Versions* read) {
   v1::ListCalibrationsRequest request;
   request.set_parent(RigName(rig));
+  if (!details) request.set_view(v1::ListCalibrationsRequest::BASIC);
   v1::ListCalibrationsResponse versions;
   const grpc::Status status = CallForAllPages<CalibrationService>(
       stub, &CalibrationService::ListCalibrations, request, &versions);
   if (!status.ok()) return status;
-  Rollback found{rig};
   for (const v1::Calibration& version : versions.calibrations()) {  // newest
     if (version.state() == v1::Calibration::ACTIVE) {
       if (since && version.create_time() < *since) return status;
-      found.from = version.version();
+      read->active = version.version();
+    } else if (version.state() == v1::Calibration::ROLLED_BACK &&
+               read->active == 0 && read->undone == 0) {
+      read->undone = version.version();
     } else if (version.state() == v1::Calibration::SUPERSEDED &&
-               found.from != 0) {
-      found.to = version;
-      *plan = std::move(found);
+               read->active != 0) {
+      read->before = version;
       return status;
     }
+  }
+  return status;
+}
+
+// Appends the rollback of a rig, or says why it is left out.
+grpc::Status Plan(const Context& context,
+                  CalibrationService* stub,
+                  const std::string& rig,
+                  const std::optional<google::protobuf::Timestamp>& since,
+                  bool again,
+                  std::vector<Rollback>* plans) {
+  Versions versions;
+  const grpc::Status status = Read(stub, rig, since, context.json, &versions);
+  if (status.error_code() == grpc::StatusCode::NOT_FOUND) {
+    PrintError(fmt::format("{} does not exist any more", rig));
+    return grpc::Status::OK;
+  }
+  if (!status.ok() || versions.active == 0) return status;
+  if (versions.undone != 0 && !again) {
+    PrintError(fmt::format(
+        "{} is rolled back already, from version {} to {}; --again rolls it "
+        "back further",
+        rig,
+        versions.undone,
+        versions.active));
+  } else if (versions.before.version() != 0) {
+    plans->push_back({rig, versions.active, versions.before});
   }
   return status;
 }
@@ -131,10 +168,13 @@ int RollBack(Context* context, const Options& options) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   std::vector<Rollback> plans;
   for (const v1::Rig& rig : rigs.rigs()) {
-    std::optional<Rollback> plan;
-    status = Plan(stub.get(), LastPart(rig.name()), since, &plan);
+    status = Plan(*context,
+                  stub.get(),
+                  LastPart(rig.name()),
+                  since,
+                  options.again,
+                  &plans);
     if (!status.ok()) return Fail(*context, status);
-    if (plan) plans.push_back(*plan);
   }
   PrintPlans(*context, plans);
   if (options.dry_run || plans.empty()) return kDone;
@@ -173,6 +213,11 @@ void AddCalibrationRollback(CLI::App* calibrations, Context* context) {
                        options->since,
                        "Only where the active version was created since then: "
                        "a time in UTC, or 2d");
+  rollback->add_flag(
+      "--again",
+      options->again,
+      "Also where a version was rolled back before, and no newer "
+      "one has become active since");
   rollback->add_flag(
       "--dry-run", options->dry_run, "Only show what would be rolled back");
   rollback->add_flag("--yes", options->yes, "Do not ask for confirmation");

@@ -60,6 +60,8 @@ struct CannedDaemon final : v1::RigService::Service,
   std::vector<v1::Calibration> calibrations;  // the last is active
   std::vector<v1::Recalibration> run;         // as it goes on
   grpc::Status refusal;                       // of CreateRig
+  std::string deleted;                        // a rig of `rigs`, meanwhile
+  v1::ListCalibrationsRequest::View last_view = {};
   v1::CompareCalibrationsResponse differences;
   std::vector<v1::AdviseMotionResponse> advice;
   std::vector<v1::VerifyRigResponse> verification;
@@ -207,6 +209,10 @@ struct CannedDaemon final : v1::RigService::Service,
       grpc::ServerContext*,
       const v1::ListCalibrationsRequest* request,
       v1::ListCalibrationsResponse* response) override {
+    last_view = request->view();
+    if (!deleted.empty() && request->parent() == deleted) {
+      return Missing(deleted);
+    }
     FillCannedPage(
         *request, calibrations, response, [&](const v1::Calibration& one) {
           *response->add_calibrations() = one;

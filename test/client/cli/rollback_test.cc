@@ -34,6 +34,12 @@ class Rollback : public Commands {
     }
   }
 
+  // As the command leaves it: 4 is rolled back, 2 is active again.
+  void LeaveRolledBack() {
+    daemon_.calibrations[1].set_state(v1::Calibration::ROLLED_BACK);
+    daemon_.calibrations[3].set_state(v1::Calibration::ACTIVE);
+  }
+
   Outcome RollBack(std::vector<std::string> more) const {
     std::vector<std::string> line = {"calibration",
                                      "rollback",
@@ -87,6 +93,51 @@ TEST_F(Rollback, HasNothingToDoForARigWithoutAnEarlierVersion) {
   const Outcome outcome = RollBack({"--yes"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(daemon_.last_reason, "");
+}
+
+// A command that fails for some rigs is repeated.
+TEST_F(Rollback, LeavesARigThatIsRolledBackAlready) {
+  LeaveRolledBack();
+  const Outcome outcome = RollBack({"--yes"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out, Not(HasSubstr("device")));
+  EXPECT_THAT(outcome.err,
+              HasSubstr("device is rolled back already, from version 4 to 2"));
+  EXPECT_EQ(daemon_.last_reason, "");
+}
+
+TEST_F(Rollback, GoesFurtherBackOnDemand) {
+  LeaveRolledBack();
+  const Outcome outcome = RollBack({"--yes", "--again"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("device\t2\t1"));
+  EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/1");
+}
+
+TEST_F(Rollback, RollsBackAVersionThatCameAfterARollBack) {
+  LeaveRolledBack();
+  daemon_.calibrations[3].set_state(v1::Calibration::SUPERSEDED);
+  daemon_.calibrations[0].set_state(v1::Calibration::ACTIVE);
+  const Outcome outcome = RollBack({"--yes"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("device\t5\t2"));
+}
+
+TEST_F(Rollback, LeavesOutARigThatIsDeletedMeanwhile) {
+  daemon_.rigs.insert(daemon_.rigs.begin(), daemon_.rigs[0]);
+  daemon_.rigs[0].set_name("rigs/scrapped");
+  daemon_.deleted = "rigs/scrapped";
+  const Outcome outcome = RollBack({"--yes"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("scrapped does not exist any more"));
+  EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/2");
+}
+
+TEST_F(Rollback, ReadsDetailsOnlyWhereItShowsThem) {
+  ASSERT_EQ(RollBack({"--dry-run"}).code, 0);
+  EXPECT_EQ(daemon_.last_view, v1::ListCalibrationsRequest::BASIC);
+  ASSERT_EQ(RollBack({"--dry-run", "--json"}).code, 0);
+  EXPECT_NE(daemon_.last_view, v1::ListCalibrationsRequest::BASIC);
 }
 
 TEST_F(Rollback, NeedsAFilterAndAReason) {
