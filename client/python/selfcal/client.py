@@ -284,6 +284,12 @@ class Daemon:
             timeout=self._timeout_s,
         )
 
+    def rig_activity(self) -> Iterator[activity.RigActivity]:
+        """The current activity of all rigs, by name."""
+        request = activity.ListActivityRequest(order_by="name")
+        for page in self._pages(self.activity_service.ListActivity, request):
+            yield from page.rigs
+
     def _pages(
         self, method: Callable[..., _Response], request: _Request
     ) -> Iterator[_Response]:

@@ -23,6 +23,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import sys
+import tempfile
 from collections.abc import Iterable, Iterator
 from typing import IO, Any
 
@@ -61,38 +62,82 @@ _DURATION = pa.duration("ns")
 _Cell = tuple[str, pa.DataType, Any]  # column, its type, value
 
 
+# Rows that are in memory at one time when a file is written.
+_BATCH = 10_000
+
+
+class _Columns:
+    """Those of all rows so far."""
+
+    def __init__(self) -> None:
+        self._names: list[str] = []
+        self._types: dict[str, pa.DataType] = {}
+
+    def add(self, row: list[_Cell]) -> None:
+        """Adds those that are new, each after the one that it follows."""
+        after = 0
+        for name, kind, _ in row:
+            if name not in self._types:
+                self._names.insert(after, name)
+                self._types[name] = kind
+            after = self._names.index(name) + 1
+
+    def schema(self) -> pa.Schema:
+        return pa.schema([(name, self._types[name]) for name in self._names])
+
+
 def table(messages: Iterable[Message]) -> pa.Table:
     """Returns messages of one type as a table. ValueError if there are none,
     because their type is not known then."""
+    columns = _Columns()
+    rows = list(_rows(messages, columns))
+    return pa.Table.from_pylist(rows, schema=columns.schema())
+
+
+def write(output: str | IO[bytes], messages: Iterable[Message]) -> None:
+    """Writes messages of one type; see `table`. Any number of them: only some
+    are in memory at one time, the others in a temporary folder, until the
+    columns of all are known."""
+    columns = _Columns()
+    rows = _rows(messages, columns)
+    parts: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        while batch := list(itertools.islice(rows, _BATCH)):
+            parts.append(f"{folder}/{len(parts)}")
+            pq.write_table(
+                pa.Table.from_pylist(batch, schema=columns.schema()), parts[-1]
+            )
+        schema = columns.schema()
+        with pq.ParquetWriter(output, schema) as writer:
+            for part in parts:
+                writer.write_table(_completed(pq.read_table(part), schema))
+
+
+def _rows(messages: Iterable[Message], columns: _Columns) -> Iterator[dict]:
+    """Adds the columns of each row before it yields it."""
     messages = iter(messages)
     first = next(messages, None)
     if first is None:
         raise ValueError("there is nothing to write")
-    columns: list[str] = []
-    types: dict[str, pa.DataType] = {}
-    rows = []
-    empty = type(first)()
-    for message in itertools.chain([empty, first], messages):
-        cells = list(_fields(message, "", message is not empty))
-        _merge(columns, [name for name, _, _ in cells])
-        types.update({name: kind for name, kind, _ in cells})
-        rows.append({name: value for name, _, value in cells})
-    schema = pa.schema([(name, types[name]) for name in columns])
-    return pa.Table.from_pylist(rows[1:], schema=schema)
+    columns.add(list(_fields(type(first)(), "", False)))
+    for message in itertools.chain([first], messages):
+        cells = list(_fields(message, "", True))
+        columns.add(cells)
+        yield {name: value for name, _, value in cells}
 
 
-def write(output: str | IO[bytes], messages: Iterable[Message]) -> None:
-    """Writes messages of one type; see `table`."""
-    pq.write_table(table(messages), output)
-
-
-def _merge(columns: list[str], row: list[str]) -> None:
-    """Adds those that are new, each after the one that it follows."""
-    after = 0
-    for name in row:
-        if name not in columns:
-            columns.insert(after, name)
-        after = columns.index(name) + 1
+def _completed(part: pa.Table, schema: pa.Schema) -> pa.Table:
+    """With null in the columns that it does not have."""
+    known = set(part.column_names)
+    return pa.Table.from_arrays(
+        [
+            part[field.name]
+            if field.name in known
+            else pa.nulls(part.num_rows, field.type)
+            for field in schema
+        ],
+        schema=schema,
+    )
 
 
 def _is_repeated(field: FieldDescriptor) -> bool:
@@ -179,14 +224,14 @@ _NO, _YES, _MAYBE = range(3)
 # Each with whether it is of one rig.
 _LISTS = {
     "rigs": (Daemon.rigs, _NO),
-    "segments": (Daemon.segments, _YES),
+    "segments": (Daemon.segments, _MAYBE),
     "calibrations": (Daemon.calibrations, _MAYBE),
     "recalibrations": (Daemon.recalibrations, _MAYBE),
     "sessions": (Daemon.sessions, _YES),
     "instructions": (Daemon.instructions, _YES),
     "estimates": (Daemon.estimates, _MAYBE),
-    "events": (Daemon.events, _NO),
-    "activity": (lambda daemon: daemon.activity(1000).rigs, _NO),
+    "events": (Daemon.events, _MAYBE),
+    "activity": (Daemon.rig_activity, _NO),
     "cohort": (lambda daemon: daemon.cohort().components, _NO),
 }
 
@@ -201,8 +246,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "rig",
         nargs="?",
-        help="of a list of one rig; without it, calibrations, recalibrations "
-        "and estimates are of all",
+        help="of a list of one rig; without it, segments, calibrations, "
+        "recalibrations, estimates and events are of all",
     )
     parser.add_argument("file")
     options = parser.parse_args(arguments)

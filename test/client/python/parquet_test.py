@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 import unittest
+from unittest import mock
 
 PACKAGE, EXTRA, SELFCALD, DEMO, SELFCAL = sys.argv[1:6]
 sys.path[:0] = [PACKAGE, EXTRA]
@@ -18,8 +19,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from demo_device import DemoDevice, run_module
 
+import selfcal
 from selfcal import parquet
-from selfcal.v1 import recalibration_pb2, segment_pb2
+from selfcal.v1 import (
+    activity_service_pb2,
+    recalibration_pb2,
+    segment_pb2,
+)
 
 
 def run(arguments: list) -> subprocess.CompletedProcess:
@@ -31,6 +37,25 @@ def nanoseconds(time: str) -> int:
     second, _, fraction = time.rstrip("Z").partition(".")
     since = datetime.datetime.fromisoformat(second + "+00:00").timestamp()
     return int(since) * 10**9 + int(fraction.ljust(9, "0") or 0)
+
+
+class ActivityInPages:
+    """A service whose pages have one rig."""
+
+    def __init__(self, rigs: list[str]) -> None:
+        self._rigs = rigs
+
+    def ListActivity(
+        self,
+        request: activity_service_pb2.ListActivityRequest,
+        timeout: float,
+    ) -> activity_service_pb2.ListActivityResponse:
+        at = int(request.page_token or 0)
+        page = activity_service_pb2.ListActivityResponse()
+        page.rigs.add(name=self._rigs[at])
+        if at + 1 < len(self._rigs):
+            page.next_page_token = str(at + 1)
+        return page
 
 
 class ParquetTest(DemoDevice):
@@ -63,7 +88,9 @@ class ParquetTest(DemoDevice):
             ("estimates", (rig,), ("estimate", "list", rig)),
             ("recalibrations", (rig,), ("run", "list", rig)),
             ("sessions", (rig,), ("session", "list", rig)),
+            ("segments", (), ("segment", "list")),
             ("events", (), ("event", "list")),
+            ("events", (rig,), ("event", "list", rig)),
         ):
             with self.subTest(name):
                 table = self.written(name, *parent)
@@ -125,12 +152,35 @@ class ParquetTest(DemoDevice):
         self.assertEqual(table["end_time"].to_pylist(), [None])
         self.assertEqual(table["segments"].to_pylist(), [["a", "b"]])
 
+    def test_activity_is_of_all_pages(self) -> None:
+        names = self.written("activity")["name"].to_pylist()
+        self.assertEqual(names, ["rigs/simulated"])
+        daemon = selfcal.connect(self.target)
+        self.addCleanup(daemon.close)
+        daemon.activity_service = ActivityInPages(["rigs/a", "rigs/b"])
+        file = f"{self.folder}/pages.parquet"
+        with mock.patch.object(parquet, "connect", return_value=daemon):
+            self.assertEqual(parquet.main(["any", "activity", file]), 0)
+        names = pq.read_table(file)["name"].to_pylist()
+        self.assertEqual(names, ["rigs/a", "rigs/b"])
+
+    def test_file_of_any_length_is_the_table_of_its_messages(self) -> None:
+        segments = [segment_pb2.Segment(sequence=k) for k in range(5)]
+        segments[1].scores.add(group="imu", entropy_nats=-2)
+        segments[4].scores.add(group="camera", gain_nats=1)
+        segments[4].receive_time.FromNanoseconds(7)
+        file = f"{self.folder}/batches.parquet"
+        with mock.patch.object(parquet, "_BATCH", 2):
+            parquet.write(file, iter(segments))
+        self.assertEqual(pq.ParquetFile(file).num_row_groups, 3)
+        self.assertTrue(pq.read_table(file).equals(parquet.table(segments)))
+
     def test_errors_say_what_is_wrong(self) -> None:
         file = f"{self.folder}/none.parquet"
         for arguments, code, text in (
             ([self.target, "segments", "nobody", file], 1, "nobody"),
-            ([self.target, "segments", file], 2, "name the rig"),
-            ([self.target, "events", "simulated", file], 2, "not of one rig"),
+            ([self.target, "sessions", file], 2, "name the rig"),
+            ([self.target, "rigs", "simulated", file], 2, "not of one rig"),
             (["unix:/nowhere", "rigs", file], 1, "selfcal.parquet: "),
         ):
             done = run(arguments)
