@@ -90,9 +90,30 @@ def _node(name: str, machine: dict, part: str) -> dict:
     return node
 
 
-def _values(inventory: dict, secrets: dict) -> dict:
-    values = settings.merged(settings.DEFAULTS, inventory)
-    values["secrets"] = secrets
+def _check_machines(machines: object) -> None:
+    if not isinstance(machines, dict) or not machines:
+        raise settings.Invalid("machines must be names with addresses")
+    for name, machine in machines.items():
+        if not isinstance(machine, dict) or set(machine) != {"address", "runs"}:
+            raise settings.Invalid(
+                f"machines.{name} must have address and runs, not {machine}"
+            )
+        for part in machine["runs"]:
+            if part not in _PARTS:
+                raise settings.Invalid(
+                    f"machines.{name}.runs has {part}; known are: "
+                    f"{', '.join(_PARTS)}"
+                )
+
+
+def values_of(inventory: dict) -> dict:
+    """The values of the templates, but for those of a machine and passwords;
+    settings.Invalid if the inventory is wrong."""
+    changes = dict(inventory)
+    machines = changes.pop("machines", None)
+    _check_machines(machines)
+    values = settings.merged(settings.DEFAULTS, changes)
+    values["machines"] = machines
     values["system"] = True
     values["scheme"] = "https" if values["tls"] else "http"
     for part, key in (
@@ -102,20 +123,21 @@ def _values(inventory: dict, secrets: dict) -> dict:
     ):
         values[key] = [
             _node(name, machine, part)
-            for name, machine in inventory["machines"].items()
+            for name, machine in machines.items()
             if part in machine["runs"]
         ]
+    settings.check(values)
     return values
 
 
-def configure(inventory: dict, secrets: dict, out: pathlib.Path) -> None:
+def configure(values: dict, secrets: dict, out: pathlib.Path) -> None:
     """Writes the files of each machine to out/MACHINE."""
-    values = _values(inventory, secrets)
-    for name, machine in inventory["machines"].items():
+    for name, machine in values["machines"].items():
         lines = []
         for part in machine["runs"]:
             known = {
                 **values,
+                "secrets": secrets,
                 "node": _node(name, machine, part),
                 "folders": _FOLDERS,
                 "files": _FILES,

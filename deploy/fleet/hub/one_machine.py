@@ -121,6 +121,7 @@ class Fleet:
             }
             for k in range(1, replicas + 1)
         ]
+        settings.check(values)
         values["daemon"] = str(daemon)
         values["secrets"] = settings.new_passwords()
         self.values = values
