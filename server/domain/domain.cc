@@ -336,18 +336,16 @@ absl::Status Domain::NoteSilentDevices() {
                              BitOf(Alarm::kSilent));
 }
 
-absl::Status Domain::NoteOutliers(
-    const std::map<std::string, std::int64_t>& outliers, bool all) {
+absl::Status Domain::NoteOutliers(const CohortFindings& findings, bool all) {
   SELFCAL_ASSIGN_OR_RETURN(const auto before, store_->ListOutliers());
   std::map<std::string, std::int64_t> changes;  // 0: not an outlier any more
   for (const auto& [rig, version] : before) {
-    if (all && !outliers.contains(rig)) changes[rig] = 0;
+    if (all && !findings.contains(rig)) changes[rig] = 0;
   }
-  for (const auto& outlier : outliers) {
-    const auto known = before.find(outlier.first);
-    if (known == before.end() || known->second != outlier.second) {
-      changes.insert(outlier);
-    }
+  for (const auto& [rig, finding] : findings) {
+    const auto known = before.find(rig);
+    const std::int64_t noted = known == before.end() ? 0 : known->second;
+    if (finding && *finding != noted) changes[rig] = *finding;
   }
   for (const auto& [rig, version] : changes) {
     const absl::Status noted =

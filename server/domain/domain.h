@@ -39,6 +39,10 @@ namespace selfcal::server {
 
 enum class PutVerdict { kStored, kDuplicate };
 
+// By rig: its version that contradicts its cohort, 0 if none does; nullopt if
+// it could not be compared.
+using CohortFindings = std::map<std::string, std::optional<std::int64_t>>;
+
 class Domain {
  public:
   // `store` must outlive it. `clock` gives the time of what is written.
@@ -178,10 +182,10 @@ class Domain {
   // Gives an alarm to the rigs whose devices have not reported for a day.
   absl::Status NoteSilentDevices();
   // Gives an alarm to the rigs whose versions contradict their cohorts, as long
-  // as these are active, and takes it from all others, unless not `all` cohorts
-  // were described.
-  absl::Status NoteOutliers(const std::map<std::string, std::int64_t>& outliers,
-                            bool all);
+  // as these are active, and takes it from those that do not. One that was not
+  // compared keeps it, and so does one that is in no cohort unless the findings
+  // are of `all` cohorts.
+  absl::Status NoteOutliers(const CohortFindings& findings, bool all);
   // Creates the runs of all rigs whose session has ended (session_trigger.h):
   // the rig is one of `ended`, or is to be checked (checks.h) and none of its
   // segments arrived after the steady time `idle_since_ns`; 0: `ended` alone.

@@ -18,6 +18,43 @@ struct Device {
   Eigen::VectorXd offset;  // of theta from the reference
 };
 
+// A rig as a device of a cohort.
+struct Measured {
+  std::string skipped;  // why it does not count; empty if it does
+  // Its calibration says whether it is like the others: it has one, or none is
+  // active but that of the factory, which contradicts nothing.
+  bool comparable = false;
+  std::int64_t version = 0;
+  Eigen::VectorXd offset;  // of theta from the reference
+  ThetaInformation information;
+};
+
+absl::StatusOr<Measured> Measure(Store* store,
+                                 const Rig& rig,
+                                 const Calibration& reference) {
+  Measured measured;
+  if (!SameShape(rig.factory, reference)) {
+    measured.skipped = "its cameras are not like those of the reference";
+    return measured;
+  }
+  const auto active = store->GetActiveCalibration(rig.id);
+  if (absl::IsNotFound(active.status()) || absl::IsDataLoss(active.status())) {
+    measured.skipped = std::string(active.status().message());
+    return measured;
+  }
+  SELFCAL_RETURN_IF_ERROR(active.status());
+  measured.comparable = true;
+  if (active->version == 1) {
+    measured.skipped = "its factory calibration is active";
+    return measured;
+  }
+  measured.version = active->version;
+  measured.offset = BoxMinus(active->theta, reference);
+  measured.information =
+      DeviceInformation(rig, active->theta, active->covariance, reference);
+  return measured;
+}
+
 class Reader {
  public:
   Reader(Store* store, CohortReport* report) : store_(store), report_(report) {}
@@ -29,22 +66,15 @@ class Reader {
       report_->reference = stored;
       reference_ = rig.factory;
       scale_ = PriorSigmas(rig);
-    } else if (!SameShape(rig.factory, reference_)) {
-      return Skip(rig.id, "its cameras are not like those of the reference");
     }
-    auto active = store_->GetActiveCalibration(rig.id);
-    if (absl::IsNotFound(active.status()) ||
-        absl::IsDataLoss(active.status())) {
-      return Skip(rig.id, std::string(active.status().message()));
+    SELFCAL_ASSIGN_OR_RETURN(Measured measured,
+                             Measure(store_, rig, reference_));
+    if (!measured.skipped.empty()) {
+      report_->skipped.push_back({rig.id, std::move(measured.skipped)});
+      return absl::OkStatus();
     }
-    SELFCAL_RETURN_IF_ERROR(active.status());
-    if (active->version == 1) {
-      return Skip(rig.id, "its factory calibration is active");
-    }
-    informations_.push_back(
-        DeviceInformation(rig, active->theta, active->covariance, reference_));
-    devices_.push_back(
-        {rig.id, active->version, BoxMinus(active->theta, reference_)});
+    informations_.push_back(std::move(measured.information));
+    devices_.push_back({rig.id, measured.version, std::move(measured.offset)});
     return absl::OkStatus();
   }
 
@@ -75,11 +105,6 @@ class Reader {
   }
 
  private:
-  absl::Status Skip(const std::string& rig, const std::string& reason) {
-    report_->skipped.push_back({rig, reason});
-    return absl::OkStatus();
-  }
-
   void FindQuantiles() {
     const auto& shares = CohortReport::kShares;
     report_->quantiles.setZero(scale_.size(), shares.size());
@@ -106,6 +131,18 @@ class Reader {
   std::vector<Device> devices_;
   std::vector<ThetaInformation> informations_;  // of the devices
 };
+
+// The findings about the rigs that the cohort was estimated of.
+CohortFindings FindingsOf(const CohortReport& report) {
+  CohortFindings findings;
+  for (const CohortReport::Device& device : report.devices) {
+    findings[device.rig] = 0;
+  }
+  for (const CohortReport::Outlier& outlier : report.outliers) {
+    findings[outlier.rig] = outlier.version;
+  }
+  return findings;
+}
 
 }  // namespace
 
@@ -136,6 +173,40 @@ absl::StatusOr<CohortReport> DescribeCohort(
   reader.Conclude(cancelled);
   if (cancelled()) return absl::CancelledError("cancelled");
   return report;
+}
+
+absl::StatusOr<CohortFindings> CompareRigs(
+    Store* store,
+    RigQuery query,
+    const CohortReport& report,
+    const std::function<bool()>& cancelled) {
+  // A list by name misses no rig that is seen meanwhile.
+  query.order = RigQuery::Order::kName;
+  CohortFindings findings = FindingsOf(report);
+  const bool estimated = std::ssize(report.cohort.devices) >= kLeastCohort;
+  // As for those that the cohort was estimated of.
+  const double limit = CohortOptions().false_alarm / report.calibrated;
+  Page page{kRigsOfPage, ""};
+  do {
+    SELFCAL_ASSIGN_OR_RETURN(const Listed<StoredRig> rigs,
+                             store->ListRigs(query, page));
+    for (const StoredRig& stored : rigs.items) {
+      if (cancelled()) return absl::CancelledError("cancelled");
+      if (findings.contains(stored.rig.id)) continue;
+      SELFCAL_ASSIGN_OR_RETURN(
+          const Measured measured,
+          Measure(store, stored.rig, report.cohort.reference));
+      std::optional<std::int64_t>& finding = findings[stored.rig.id];
+      if (!measured.comparable) continue;
+      const bool unlike =
+          estimated && measured.skipped.empty() &&
+          CompareWithCohort(report.cohort, measured.information).probability <
+              limit;
+      finding = unlike ? measured.version : 0;
+    }
+    page.token = rigs.next_token;
+  } while (!page.token.empty());
+  return findings;
 }
 
 }  // namespace selfcal::server

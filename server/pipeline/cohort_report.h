@@ -12,6 +12,7 @@
 
 #include "core/population/consistency.h"
 #include "core/population/estimate.h"
+#include "server/domain/domain.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -55,5 +56,13 @@ absl::StatusOr<CohortReport> DescribeCohort(
     const RigQuery& query,
     int max_rigs,
     const std::function<bool()>& cancelled = [] { return false; });
+
+// Compares all rigs of the query with the cohort of its report, also those
+// beyond `max_rigs`. CANCELLED soon after `cancelled` returns true.
+absl::StatusOr<CohortFindings> CompareRigs(
+    Store* store,
+    RigQuery query,
+    const CohortReport& report,
+    const std::function<bool()>& cancelled);
 
 }  // namespace selfcal::server

@@ -15,8 +15,7 @@
 namespace selfcal::server {
 namespace {
 
-constexpr int kMostRigs = 500;       // of a cohort: those that were seen last
-constexpr std::int64_t kKept = 400;  // versions of a cohort
+constexpr std::int64_t kKept = 400;      // versions of a cohort
 constexpr std::size_t kMostShown = 100;  // characters of a label in the log
 
 // True if the statistics are of the same versions of the same devices.
@@ -33,7 +32,7 @@ bool IsOfTheSame(const v1::Cohort& a, const v1::Cohort& b) {
 
 struct Described {
   bool is_new = false;  // a version was stored
-  std::map<std::string, std::int64_t> outliers;
+  CohortFindings findings;
 };
 
 absl::StatusOr<Described> DescribeAndStore(
@@ -41,18 +40,18 @@ absl::StatusOr<Described> DescribeAndStore(
     const std::string& label,
     const std::string& value,
     std::int64_t now_ns,
-    const std::function<bool()>& stopping) {
+    const std::function<bool()>& stopping,
+    int sample) {
   RigQuery query;
   query.order = RigQuery::Order::kLastSeen;
   query.descending = true;
   query.labels[label] = value;
   Described described;
   SELFCAL_ASSIGN_OR_RETURN(const CohortReport report,
-                           DescribeCohort(store, query, kMostRigs, stopping));
+                           DescribeCohort(store, query, sample, stopping));
+  SELFCAL_ASSIGN_OR_RETURN(described.findings,
+                           CompareRigs(store, query, report, stopping));
   if (report.calibrated == 0) return described;
-  for (const CohortReport::Outlier& outlier : report.outliers) {
-    described.outliers[outlier.rig] = outlier.version;
-  }
   const v1::Cohort cohort = Encode(report);
   SELFCAL_ASSIGN_OR_RETURN(const auto newest,
                            store->ListCohorts(label, value, {1, ""}));
@@ -76,20 +75,21 @@ absl::StatusOr<Described> DescribeAndStore(
 absl::StatusOr<int> UpdateCohorts(Domain* domain,
                                   const std::string& label,
                                   std::int64_t now_ns,
-                                  const std::function<bool()>& stopping) {
+                                  const std::function<bool()>& stopping,
+                                  int sample) {
   Store* const store = domain->store();
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> values,
                            store->ListLabelValues(label));
   int stored = 0;
   bool all = true;
-  std::map<std::string, std::int64_t> outliers;
+  CohortFindings findings;
   for (const std::string& value : values) {
     if (stopping()) return stored;
     const auto described =
-        DescribeAndStore(store, label, value, now_ns, stopping);
+        DescribeAndStore(store, label, value, now_ns, stopping, sample);
     if (described.ok()) {
       stored += described->is_new;
-      outliers.insert(described->outliers.begin(), described->outliers.end());
+      findings.insert(described->findings.begin(), described->findings.end());
       continue;
     }
     // Its last rig is gone, or has another label, since the values were read.
@@ -101,7 +101,7 @@ absl::StatusOr<int> UpdateCohorts(Domain* domain,
                  SafeLine(value, kMostShown),
                  std::string(described.status().message()));
   }
-  SELFCAL_RETURN_IF_ERROR(domain->NoteOutliers(outliers, all));
+  SELFCAL_RETURN_IF_ERROR(domain->NoteOutliers(findings, all));
   return stored;
 }
 

@@ -18,15 +18,20 @@
 
 namespace selfcal::server {
 
+// Rigs of which a cohort is estimated: those that were seen last.
+inline constexpr int kCohortSample = 500;
+
 // Describes each cohort of the label, stores a version of those whose devices,
-// or their active versions, are others than in the newest one, and gives an
-// alarm to the rigs that contradict their cohorts. Returns how many versions it
-// stored. A cohort that cannot be described is logged and does not hold up the
-// others. Ends early, and without alarms, if `stopping` returns true.
+// or their active versions, are others than in the newest one, compares all of
+// their rigs with it, and gives an alarm to those that contradict it. Returns
+// how many versions it stored. A cohort that cannot be described is logged and
+// does not hold up the others. Ends early, and without alarms, if `stopping`
+// returns true.
 absl::StatusOr<int> UpdateCohorts(Domain* domain,
                                   const std::string& label,
                                   std::int64_t now_ns,
-                                  const std::function<bool()>& stopping);
+                                  const std::function<bool()>& stopping,
+                                  int sample = kCohortSample);
 
 class Population {
  public:

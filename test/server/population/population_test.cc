@@ -48,11 +48,24 @@ class PopulationTest : public CalibratedDevices {
     }
   }
 
-  int Update(std::int64_t now_ns = kNow) {
-    const auto stored =
-        UpdateCohorts(&*domain_, "model", now_ns, [] { return false; });
+  int Update(std::int64_t now_ns = kNow, int sample = kCohortSample) {
+    const auto stored = UpdateCohorts(
+        &*domain_, "model", now_ns, [] { return false; }, sample);
     EXPECT_TRUE(stored.ok()) << stored.status();
     return stored.value_or(-1);
+  }
+
+  std::map<std::string, std::vector<Alarm>> WithAlarms() {
+    RigQuery query;
+    query.with_alarms = true;
+    const auto listed = store_->ListRigSummaries(query, {100, ""});
+    EXPECT_TRUE(listed.ok()) << listed.status();
+    std::map<std::string, std::vector<Alarm>> alarms;
+    if (!listed.ok()) return alarms;
+    for (const RigSummary& rig : listed->items) {
+      alarms[rig.rig] = AlarmsOf(rig, kNow);
+    }
+    return alarms;
   }
 
   std::vector<StoredCohort> Versions(const std::string& model) {
@@ -138,32 +151,63 @@ TEST_F(PopulationTest, PriorIsTheRigOfANewDevice) {
 TEST_F(PopulationTest, RigThatContradictsItsCohortHasAnAlarm) {
   AddMany(8, "t4");
   Add("knocked", "t4", kMean_px + 20 * kSpread_px);
-  const auto with_alarms = [&] {
-    RigQuery query;
-    query.with_alarms = true;
-    const auto listed = store_->ListRigSummaries(query, {100, ""});
-    EXPECT_TRUE(listed.ok()) << listed.status();
-    std::map<std::string, std::vector<Alarm>> alarms;
-    for (const RigSummary& rig : listed->items) {
-      alarms[rig.rig] = AlarmsOf(rig, kNow);
-    }
-    return alarms;
-  };
-  EXPECT_TRUE(with_alarms().empty());
+  EXPECT_TRUE(WithAlarms().empty());
   Update();
   const std::map<std::string, std::vector<Alarm>> expected = {
       {"knocked", {Alarm::kUnlikeCohort}}};
-  EXPECT_EQ(with_alarms(), expected);
+  EXPECT_EQ(WithAlarms(), expected);
   // Of the version, not of the rig.
   ASSERT_TRUE(domain_->ActivateCalibration("knocked", 1, "eve", "test").ok());
-  EXPECT_TRUE(with_alarms().empty());
+  EXPECT_TRUE(WithAlarms().empty());
   ASSERT_TRUE(domain_->ActivateCalibration("knocked", 2, "eve", "test").ok());
-  EXPECT_EQ(with_alarms(), expected);
+  EXPECT_EQ(WithAlarms(), expected);
   // In another cohort it contradicts nothing.
   SetModel("knocked", "t5");
   Update();
-  EXPECT_TRUE(with_alarms().empty());
+  EXPECT_TRUE(WithAlarms().empty());
   EXPECT_TRUE(store_->ListOutliers()->empty());
+}
+
+// A device that is switched off is not seen any more.
+TEST_F(PopulationTest, RigsBeyondTheSampleAreComparedToo) {
+  constexpr int kSample = 8;
+  Add("knocked", "t4", kMean_px + 20 * kSpread_px);
+  Add("bent", "t4", kMean_px - 20 * kSpread_px);
+  Add("inside", "t4", kMean_px + 0.1);
+  AddMany(kSample, "t4");
+  Update(kNow, kSample);
+  v1::Cohort cohort;
+  ASSERT_TRUE(cohort.ParseFromString(Versions("t4").at(0).content));
+  ASSERT_EQ(cohort.calibrated(), kSample);
+  EXPECT_EQ(cohort.outliers_size(), 0);
+  const std::map<std::string, std::vector<Alarm>> expected = {
+      {"bent", {Alarm::kUnlikeCohort}}, {"knocked", {Alarm::kUnlikeCohort}}};
+  EXPECT_EQ(WithAlarms(), expected);
+}
+
+TEST_F(PopulationTest, AlarmEndsByAComparisonAlone) {
+  constexpr int kSample = 8;
+  Add("knocked", "t4", kMean_px + 20 * kSpread_px);
+  AddMany(kSample, "t4");
+  Update();
+  ASSERT_EQ(WithAlarms().size(), 1u);
+  Update(kNow, kSample);  // it is not among those that were seen last
+  EXPECT_EQ(WithAlarms().size(), 1u);
+  SetModel("knocked", "t5");
+  Update();
+  EXPECT_TRUE(WithAlarms().empty());
+}
+
+TEST_F(PopulationTest, AlarmOfARigThatCannotBeComparedStays) {
+  Rig other = TestRig("other");
+  other.factory.cameras.push_back(other.factory.cameras[0]);
+  ASSERT_TRUE(domain_->CreateRig(other).ok());
+  SetModel("other", "t4");
+  ASSERT_TRUE(domain_->NoteOutliers({{"other", 1}}, false).ok());
+  ASSERT_EQ(WithAlarms().size(), 1u);
+  AddMany(5, "t4");
+  Update();
+  EXPECT_EQ(WithAlarms().size(), 1u);
 }
 
 TEST_F(PopulationTest, ThreadDescribesCohortsUntilItIsStopped) {
