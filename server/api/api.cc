@@ -10,7 +10,8 @@ Api::Api(Domain* domain,
          Pipeline* pipeline,
          EventFeed* feed,
          ApiOptions options)
-    : versions_(domain->store()) {
+    : watches_(domain->store()), versions_(domain->store()) {
+  pipeline->ListenForDeletions(watches_.EnderOfGone());
   Methods methods({domain,
                    domain->store(),
                    pipeline,

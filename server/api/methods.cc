@@ -155,7 +155,10 @@ void Methods::AddWatch(Method method, WatchHandler handler) {
       if (!status.ok()) return status;
       const std::string rig = RigOf(*this_method, request);
       // Registered first: a rig that is deleted meanwhile is not missed.
-      auto of_rig = rig.empty() ? nullptr : context.watches->Add(rig, queue);
+      std::shared_ptr<void> of_rig;
+      if (!rig.empty()) {
+        SELFCAL_ASSIGN_OR_RETURN(of_rig, context.watches->Add(rig, queue));
+      }
       SELFCAL_ASSIGN_OR_RETURN(auto subscription,
                                handler(call, request, queue));
       return std::make_shared<std::array<std::shared_ptr<void>, 2>>(

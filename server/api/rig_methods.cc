@@ -164,11 +164,7 @@ absl::StatusOr<google::protobuf::Empty> DeleteRig(
   const absl::Status deleted =
       context.pipeline->DeleteRig(*id, call.caller.name, request.reason());
   if (!deleted.ok()) return About(deleted, {kRigType, request.name(), {}});
-  context.watches->End(
-      *id,
-      About(absl::NotFoundError(request.name() + " was deleted; this watch "
-                                                 "has ended"),
-            {kRigType, request.name(), {}}));
+  context.watches->End(*id);
   return google::protobuf::Empty();
 }
 

@@ -15,7 +15,11 @@ void AnnouncementRelay::Act(const Announcement& announcement) {
     case Announcement::Kind::kRun:
       OnRun(announcement.rig, announcement.run);
       break;
+    case Announcement::Kind::kDeletion:
+      OnDeletion(announcement.rig);
+      break;
     case Announcement::Kind::kMissed:
+      OnDeletion("");
       for (const auto& rig : calibration_watchers_->Topics()) {
         OnCalibration(rig);
       }
@@ -25,10 +29,20 @@ void AnnouncementRelay::Act(const Announcement& announcement) {
 }
 
 void AnnouncementRelay::PassOnRig(const std::string& rig) {
+  OnDeletion(rig);
   OnCalibration(rig);
   for (const auto& [of, run] : run_watchers_->Topics()) {
     if (of == rig) OnRun(rig, run);
   }
+}
+
+void AnnouncementRelay::OnDeletion(const std::string& rig) {
+  std::function<void(const std::string&)> deleted;
+  {
+    const std::lock_guard lock(mutex_);
+    deleted = deleted_;
+  }
+  if (deleted) deleted(rig);
 }
 
 // Should the store fail in one of the following, the listener reports soon that

@@ -1,12 +1,15 @@
 // Acts on what other daemons announce (server/store/announcements.h): passes
 // their activations and runs on to the watchers of this one, interrupts a run
 // that another one has ended, and looks for a run that another one has created.
-// Also passes on what devices report.
+// Also passes on what devices report, and whatever of these deletes a rig.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <utility>
 
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/rig_claims.h"
@@ -34,11 +37,19 @@ class AnnouncementRelay {
   // No announcement is acted on afterwards.
   void Stop() { listener_.reset(); }
 
+  // Pipeline::ListenForDeletions.
+  void ListenForDeletions(std::function<void(const std::string&)> deleted) {
+    const std::lock_guard lock(mutex_);
+    deleted_ = std::move(deleted);
+  }
+
   // Passes on what a device has reported of its rig.
   void PassOnRig(const std::string& rig);
 
  private:
   void Act(const Announcement& announcement);
+  // An empty name: of any rig.
+  void OnDeletion(const std::string& rig);
   void OnCalibration(const std::string& rig);
   void OnRun(const std::string& rig, std::int64_t number);
 
@@ -47,6 +58,8 @@ class AnnouncementRelay {
   Recalibrator* const recalibrator_;
   Watchers<StoredCalibration>* const calibration_watchers_;
   Watchers<RunUpdate>* const run_watchers_;
+  std::mutex mutex_;
+  std::function<void(const std::string&)> deleted_;  // guarded by mutex_
   std::shared_ptr<void> listener_;  // null unless the database is shared
 };
 

@@ -341,6 +341,11 @@ class PipelineImpl : public Pipeline {
     return verifier_.VerifyRig(rig, on_step, interrupted);
   }
 
+  void ListenForDeletions(
+      std::function<void(const std::string& rig)> deleted) override {
+    relay_.ListenForDeletions(std::move(deleted));
+  }
+
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const std::shared_ptr<const StoredCalibration>&)>

@@ -250,9 +250,17 @@ class Pipeline {
       const OnVerificationStep& on_step,
       const std::function<bool()>& interrupted) = 0;
 
+  // `deleted` is called with a rig that may have been deleted, by whichever
+  // daemon or by a report, before watchers learn of another rig of that name;
+  // with an empty name, any may have been. It may read the store, on a thread
+  // that it may hold up. DeleteRig does not call it.
+  virtual void ListenForDeletions(
+      std::function<void(const std::string& rig)> deleted) = 0;
+
   // The callback receives the active calibration of the rig at once (on the
   // calling thread), then each one that becomes active, in that order: each
-  // activation once. All watchers share the record of an activation.
+  // activation once, and none of another rig that has the name later. All
+  // watchers share the record of an activation.
   virtual absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const std::shared_ptr<const StoredCalibration>&)>

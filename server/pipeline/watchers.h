@@ -40,9 +40,10 @@ inline LastRunUpdate Remembered(const RunUpdate& update) {
 
 // Each activation of a rig once, in order. The newest one need not have the
 // highest version: an older version may have been activated again. A rig that
-// was deleted and created again counts its activations from 1.
+// was deleted and created again is another one, which the watcher may not have
+// the right to see.
 inline bool Follows(const LastActivation& last, const StoredCalibration& next) {
-  return next.rig_key != last.rig_key || next.activation > last.activation;
+  return next.rig_key == last.rig_key && next.activation > last.activation;
 }
 
 // No update after the end of a run.

@@ -13,6 +13,7 @@ namespace {
 
 constexpr char kCalibration[] = "calibration";
 constexpr char kRun[] = "run";
+constexpr char kDeletion[] = "deletion";
 
 }  // namespace
 
@@ -24,12 +25,19 @@ absl::Status AnnounceRun(UnitOfWork* tx, std::int64_t run) {
   return tx->db()->Announce(fmt::format("{} {} {}", kRun, tx->rig(), run));
 }
 
+absl::Status AnnounceDeletion(UnitOfWork* tx) {
+  return tx->db()->Announce(fmt::format("{} {}", kDeletion, tx->rig()));
+}
+
 std::optional<Announcement> ParseAnnouncement(
     const std::optional<std::string>& text) {
   if (!text) return Announcement{};
   const std::vector<std::string> words = absl::StrSplit(*text, ' ');
   if (words.size() == 2 && words[0] == kCalibration) {
     return Announcement{Announcement::Kind::kCalibration, words[1]};
+  }
+  if (words.size() == 2 && words[0] == kDeletion) {
+    return Announcement{Announcement::Kind::kDeletion, words[1]};
   }
   std::int64_t run = 0;
   if (words.size() == 3 && words[0] == kRun &&

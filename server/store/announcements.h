@@ -19,6 +19,7 @@ struct Announcement {
   enum class Kind {
     kCalibration,  // another version of the rig is active
     kRun,          // a run was created, or its state has changed
+    kDeletion,     // the rig was deleted
     kMissed,       // some announcements may have been missed
   };
   Kind kind = Kind::kMissed;
@@ -31,6 +32,7 @@ struct Announcement {
 // Announces it when the unit of work is committed.
 absl::Status AnnounceCalibration(UnitOfWork* tx);
 absl::Status AnnounceRun(UnitOfWork* tx, std::int64_t run);
+absl::Status AnnounceDeletion(UnitOfWork* tx);
 
 // The announcement of a text of Database::Listen. nullopt if the program does
 // not know it: a newer one has sent it.

@@ -99,6 +99,11 @@ class DatabaseStore final : public Store {
     return Read([&](Connection* db) { return ListRigRows(db, query, page); });
   }
 
+  absl::StatusOr<std::map<std::string, std::int64_t>> GetRigKeys(
+      const std::set<std::string>& names) override {
+    return Read([&](Connection* db) { return ReadRigKeys(db, names); });
+  }
+
   absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
       const RigQuery& query, const Page& page) override {
     return Read(

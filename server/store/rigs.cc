@@ -5,6 +5,7 @@
 #include <random>
 
 #include "server/status/status_macros.h"
+#include "server/store/announcements.h"
 #include "server/store/checksum.h"
 #include "server/store/driver/sql_condition.h"
 #include "server/store/driver/statement.h"
@@ -156,7 +157,7 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
     SELFCAL_RETURN_IF_ERROR(
         run(fmt::format("DELETE FROM {} WHERE rig = ?1", table)));
   }
-  return absl::OkStatus();
+  return AnnounceDeletion(tx);
 }
 
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig) {
@@ -194,6 +195,21 @@ absl::StatusOr<std::map<std::string, StoredRig>> ReadRigs(
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return rigs;
+}
+
+absl::StatusOr<std::map<std::string, std::int64_t>> ReadRigKeys(
+    Connection* db, const std::set<std::string>& names) {
+  std::map<std::string, std::int64_t> keys;
+  if (names.empty()) return keys;
+  SqlCondition condition;
+  condition.AndOneOf("id", names);
+  Statement read(db,
+                 condition.reuse(),
+                 "SELECT id, rig FROM rigs WHERE " + condition.sql());
+  condition.Bind(&read);
+  while (read.Next()) keys[read.Text(0)] = read.Int(1);
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return keys;
 }
 
 absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx) {

@@ -32,6 +32,9 @@ absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);
 // Store::GetRigs.
 absl::StatusOr<std::map<std::string, StoredRig>> ReadRigs(
     Connection* db, const std::set<std::string>& names);
+// Store::GetRigKeys.
+absl::StatusOr<std::map<std::string, std::int64_t>> ReadRigKeys(
+    Connection* db, const std::set<std::string>& names);
 // The bits of server/domain/alarms.h.
 absl::Status WriteAlarms(UnitOfWork* tx, std::int64_t alarms);
 // Sets these bits of the rigs from which their devices have not reported since

@@ -353,6 +353,10 @@ class Store {
   // Those that exist, by name.
   virtual absl::StatusOr<std::map<std::string, StoredRig>> GetRigs(
       const std::set<std::string>& names) = 0;
+  // The same, their keys in the database: a rig that was deleted and created
+  // again has another one.
+  virtual absl::StatusOr<std::map<std::string, std::int64_t>> GetRigKeys(
+      const std::set<std::string>& names) = 0;
   // Both read no more than the page, however many rigs there are, unless the
   // query has conditions.
   virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const RigQuery& query,

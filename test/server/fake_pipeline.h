@@ -24,6 +24,8 @@ class FakePipeline final : public Pipeline {
   absl::Status Start() override { return absl::OkStatus(); }
   void Stop() override {}
 
+  void ListenForDeletions(std::function<void(const std::string&)>) override {}
+
   // Replaces what Submit does after validation.
   std::function<absl::StatusOr<SubmitResult>(const std::function<bool()>&)>
       submit_hook;

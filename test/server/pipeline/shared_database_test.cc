@@ -71,6 +71,42 @@ TEST_F(SharedDatabase, AWatchSeesActivationsOfEveryDaemonOnceAndInOrder) {
   EXPECT_TRUE(has_seen({1, 2, 1, 2}));
 }
 
+TEST_F(SharedDatabase, ADeletionIsAnnouncedAndANewRigOfTheNameIsNotWatched) {
+  std::mutex mutex;
+  std::vector<std::string> deleted;
+  b_.pipeline->ListenForDeletions([&](const std::string& rig) {
+    const std::lock_guard lock(mutex);
+    if (!rig.empty()) deleted.push_back(rig);
+  });
+  std::vector<std::int64_t> of_old;
+  std::vector<std::int64_t> of_new;
+  const auto watch = [&](std::vector<std::int64_t>* seen) {
+    auto subscription =
+        b_.pipeline->WatchCalibration("a", [&, seen](const auto& active) {
+          const std::lock_guard lock(mutex);
+          seen->push_back(active->version);
+        });
+    EXPECT_TRUE(subscription.ok()) << subscription.status();
+    return *std::move(subscription);
+  };
+  const auto old_watch = watch(&of_old);
+  ASSERT_TRUE(a_.pipeline->DeleteRig("a", "test", "sold").ok());
+  EXPECT_TRUE(Eventually([&] {
+    const std::lock_guard lock(mutex);
+    return deleted == std::vector<std::string>{"a"};
+  }));
+  ASSERT_TRUE(a_.domain->CreateRig(TestRig("a")).ok());
+  const auto new_watch = watch(&of_new);
+  SubmitTo(a_, 0);
+  SubmitTo(a_, 1);  // the tables are full
+  EXPECT_TRUE(Eventually([&] {
+    const std::lock_guard lock(mutex);
+    return of_new == std::vector<std::int64_t>{1, 2};
+  }));
+  const std::lock_guard lock(mutex);
+  EXPECT_EQ(of_old, std::vector<std::int64_t>{1});
+}
+
 TEST_F(SharedDatabase, AWatchSeesTheEndOfARunOfAnotherDaemon) {
   SubmitTo(a_, 0);
   ASSERT_TRUE(Eventually([&] { return a_.store->ListUnscored(1)->empty(); }));

@@ -3,6 +3,7 @@
 
 #include "server/store/events.h"
 #include "server/store/report.h"
+#include "selfcal/v1/calibration_service.pb.h"
 #include "test/server/uplink/uplink_fixture.h"
 
 namespace selfcal::server {
@@ -314,6 +315,33 @@ TEST_F(ReporterTest, WatchersAtTheHubSeeWhatIsReported) {
   ASSERT_TRUE(device_.domain->FinishRun("a", run->run, result).ok());
   Report();
   EXPECT_THAT(versions, ::testing::ElementsAre(1, 2));
+}
+
+TEST_F(ReporterTest, WatchesAtTheHubEndWithAReportedDeletion) {
+  CreateDeviceRig();
+  Begin();
+  Report();
+  v1::WatchCalibrationRequest request;
+  request.set_parent("rigs/a");
+  Call call;
+  call.caller = {"reader", {{Role::kRead, ""}}};
+  const auto queue = std::make_shared<WatchQueue>();
+  std::shared_ptr<void> watch;
+  for (const Method& method : hub_.api->methods()) {
+    if (method.descriptor->input_type() != request.GetDescriptor()) continue;
+    auto begun =
+        std::get<WatchHandler>(method.handler)(call, request, queue);
+    ASSERT_TRUE(begun.ok()) << begun.status();
+    watch = *std::move(begun);
+  }
+  EXPECT_TRUE(queue->Take().update);
+  EXPECT_FALSE(queue->Take().ended);
+  ASSERT_TRUE(device_.domain->DeleteRig("a", "me", "sold").ok());
+  Report();
+  EXPECT_TRUE(absl::IsNotFound(hub_.store->GetRig("a").status()));
+  const WatchQueue::Taken end = queue->Take();
+  EXPECT_TRUE(end.ended);
+  EXPECT_TRUE(absl::IsNotFound(end.status)) << end.status;
 }
 
 }  // namespace
