@@ -33,8 +33,8 @@ std::chrono::steady_clock::duration Seconds(double seconds) {
 
 }  // namespace
 
-absl::StatusOr<Reporter::Round> Reporter::ReportOnce(
-    Time now, const std::function<bool(std::int64_t bytes)>& pace) {
+absl::StatusOr<Reporter::Round> Reporter::ReportOnce(Time now,
+                                                     const Pace& pace) {
   Outbox* const outbox = store_->outbox();
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> unreported,
                            outbox->ListUnreported());
@@ -54,20 +54,19 @@ absl::StatusOr<Reporter::Round> Reporter::ReportOnce(
       if (now < known.blocked) round.refusal = known.refusal;
       continue;
     }
-    const std::int64_t before = round.bytes;
-    const absl::Status status = ReportRig(rig, now, &known, &round);
+    const absl::Status status = ReportRig(rig, now, pace, &known, &round);
     if (IsUnreachable(status)) {
       round.status = status;
       return round;
     }
     SELFCAL_RETURN_IF_ERROR(status);
-    if (!pace(round.bytes - before)) break;
   }
   return round;
 }
 
 absl::Status Reporter::ReportRig(const ReportedRig& rig,
                                  Time now,
+                                 const Pace& pace,
                                  Rig* known,
                                  Round* round) {
   Outbox* const outbox = store_->outbox();
@@ -84,6 +83,10 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
   for (const auto& [name, result] : known->results) {
     *request.add_results() = result;
   }
+  // Also those of a report that fails: it may have reached the hub.
+  const auto bytes = static_cast<std::int64_t>(request.ByteSizeLong());
+  if (!pace(bytes)) return absl::CancelledError("the daemon is stopping");
+  round->bytes += bytes;
   const auto response = hub_->Report(request);
   if (!response.ok()) {
     if (IsUnreachable(response.status())) return response.status();
@@ -99,7 +102,6 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
   }
   known->next = now + Seconds(options_.interval_s);
   ++round->reports;
-  round->bytes += static_cast<std::int64_t>(request.ByteSizeLong());
   if (response->begin_anew()) return BeginAnew(rig.rig, now, known, round);
   if (report.waiting == 0) known->begins_anew = false;
   if (!known->begins_anew) {

@@ -38,7 +38,7 @@ class Reporter {
 
   struct Round {
     std::int64_t reports = 0;
-    std::int64_t bytes = 0;
+    std::int64_t bytes = 0;    // of all requests, also of those that failed
     std::int64_t waiting = 0;  // records that are left
     absl::Status status;       // an error: the hub cannot be reached
     // Why the hub has refused the reports of a rig, which are tried again
@@ -46,11 +46,11 @@ class Reporter {
     std::string refusal;
   };
   // Sends one report of each rig that has something to report, or from which
-  // the hub has not heard for the interval. `pace` is called after each with
-  // its bytes, and may wait; false: the daemon is stopping. An error is one of
-  // the store.
-  absl::StatusOr<Round> ReportOnce(
-      Time now, const std::function<bool(std::int64_t bytes)>& pace);
+  // the hub has not heard for the interval. `pace` is called before each with
+  // its bytes, and may wait; false: the daemon is stopping, and the round is
+  // CANCELLED. An error is one of the store.
+  using Pace = std::function<bool(std::int64_t bytes)>;
+  absl::StatusOr<Round> ReportOnce(Time now, const Pace& pace);
 
  private:
   // What the reporter remembers of a rig, by its key.
@@ -66,6 +66,7 @@ class Reporter {
 
   absl::Status ReportRig(const ReportedRig& rig,
                          Time now,
+                         const Pace& pace,
                          Rig* known,
                          Round* round);
   // Puts all records into the outbox, because the hub asks for them: at once if

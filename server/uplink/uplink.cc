@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
-#include <functional>
 #include <utility>
 
 #include "server/pipeline/backoff.h"
@@ -21,8 +20,8 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kLookAfter{500};
 
 // A round of reports; what it throws, e.g. for a lack of memory, is its error.
-absl::StatusOr<Reporter::Round> ReportGuarded(
-    Reporter* reporter, const std::function<bool(std::int64_t)>& pace) {
+absl::StatusOr<Reporter::Round> ReportGuarded(Reporter* reporter,
+                                              const Reporter::Pace& pace) {
   try {
     return reporter->ReportOnce(SteadyClock::now(), pace);
   } catch (const std::exception& error) {
@@ -68,14 +67,17 @@ bool Uplink::Wait(SteadyClock::duration duration) {
 
 void Uplink::Run() {
   Reporter reporter(store_, api_, hub_.get(), options_, program_version_);
+  SteadyClock::time_point next{};  // no report before, by the limit
   const auto pace = [&](std::int64_t bytes) {
-    if (options_.max_bytes_per_s == 0) {
-      return Wait(SteadyClock::duration::zero());
+    if (!Wait(next - SteadyClock::now())) return false;
+    if (options_.max_bytes_per_s > 0) {
+      next = SteadyClock::now() +
+             std::chrono::duration_cast<SteadyClock::duration>(
+                 std::chrono::duration<double>(
+                     static_cast<double>(bytes) /
+                     static_cast<double>(options_.max_bytes_per_s)));
     }
-    return Wait(std::chrono::duration_cast<SteadyClock::duration>(
-        std::chrono::duration<double>(
-            static_cast<double>(bytes) /
-            static_cast<double>(options_.max_bytes_per_s))));
+    return true;
   };
   std::string problem;  // that was logged last; empty: none
   Backoff backoff;

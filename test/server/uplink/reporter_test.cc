@@ -1,9 +1,9 @@
 // Rounds of reports, step by step.
 #include "server/uplink/reporter.h"
 
+#include "selfcal/v1/calibration_service.pb.h"
 #include "server/store/events.h"
 #include "server/store/report.h"
-#include "selfcal/v1/calibration_service.pb.h"
 #include "test/server/uplink/uplink_fixture.h"
 
 namespace selfcal::server {
@@ -107,6 +107,37 @@ TEST_F(ReporterTest, WhatTheHubDoesNotTakeWaits) {
   EXPECT_TRUE(Report().status.ok());
   EXPECT_EQ(SegmentsAtHub(), 2u);
   EXPECT_EQ(device_.store->outbox()->List()->front().waiting, 0);
+}
+
+// They may have reached the hub, and cost as much as those that it takes.
+TEST_F(ReporterTest, FailedReportsAreCharged) {
+  CreateDeviceRig("a");
+  Begin();
+  way_.reachable = false;
+  const Reporter::Round unreachable = Report();
+  EXPECT_TRUE(absl::IsUnavailable(unreachable.status));
+  EXPECT_GT(unreachable.bytes, 1000);
+  EXPECT_EQ(paced_, unreachable.bytes);
+  way_.reachable = true;
+  way_.answers_lost = 1;
+  paced_ = 0;
+  EXPECT_FALSE(Report().status.ok());
+  EXPECT_EQ(paced_, unreachable.bytes);
+  // A refusal, too.
+  way_.caller.grants.clear();
+  paced_ = 0;
+  EXPECT_NE(Report().refusal, "");
+  EXPECT_EQ(paced_, unreachable.bytes);
+}
+
+TEST_F(ReporterTest, NothingIsSentAfterAStop) {
+  CreateDeviceRig("a");
+  Begin();
+  const auto round =
+      reporter_->ReportOnce(now_, [](std::int64_t) { return false; });
+  ASSERT_TRUE(round.ok()) << round.status();
+  EXPECT_TRUE(absl::IsCancelled(round->status));
+  EXPECT_EQ(way_.calls, 0);
 }
 
 TEST_F(ReporterTest, AReportFollowsAfterTheInterval) {
@@ -329,8 +360,7 @@ TEST_F(ReporterTest, WatchesAtTheHubEndWithAReportedDeletion) {
   std::shared_ptr<void> watch;
   for (const Method& method : hub_.api->methods()) {
     if (method.descriptor->input_type() != request.GetDescriptor()) continue;
-    auto begun =
-        std::get<WatchHandler>(method.handler)(call, request, queue);
+    auto begun = std::get<WatchHandler>(method.handler)(call, request, queue);
     ASSERT_TRUE(begun.ok()) << begun.status();
     watch = *std::move(begun);
   }

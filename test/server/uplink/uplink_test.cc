@@ -1,6 +1,9 @@
 // The uplink as it runs.
 #include "server/uplink/uplink.h"
 
+#include <chrono>
+#include <thread>
+
 #include "test/server/uplink/uplink_fixture.h"
 
 namespace selfcal::server {
@@ -10,7 +13,9 @@ class UplinkTest : public UplinkFixture {
  protected:
   // The way to the hub that the uplink has; its owner is the uplink.
   FakeHub* Begin(const UplinkOptions& options = {}) {
-    auto way = std::make_unique<FakeHub>(&*hub_.api);
+    return Begin(options, std::make_unique<FakeHub>(&*hub_.api));
+  }
+  FakeHub* Begin(const UplinkOptions& options, std::unique_ptr<FakeHub> way) {
     FakeHub* const kept = way.get();
     uplink_ = std::make_unique<Uplink>(
         device_.store.get(), &*device_.api, std::move(way), options, "1.2.3");
@@ -54,7 +59,20 @@ TEST_F(UplinkTest, StopsAtOnceWhileItIsLimited) {
   CreateDeviceRig();
   Begin({.max_bytes_per_s = 1});
   EXPECT_TRUE(Eventually([&] { return hub_.store->GetRig("a").ok(); }));
+  Put(0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));
   uplink_->Stop();  // would wait for an hour
+}
+
+TEST_F(UplinkTest, LimitHoldsWhileTheHubIsAway) {
+  CreateDeviceRig();
+  auto away = std::make_unique<FakeHub>(&*hub_.api);
+  away->reachable = false;
+  FakeHub* const way = Begin({.max_bytes_per_s = 1}, std::move(away));
+  EXPECT_TRUE(Eventually([&] { return way->calls > 0; }));
+  // It would have tried again after half a second.
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  EXPECT_EQ(way->calls, 1);
 }
 
 TEST_F(UplinkTest, WithoutAHubNothingIsNoted) {
