@@ -215,11 +215,12 @@ absl::StatusOr<ScoreCommit> Domain::CommitScore(
 }
 
 absl::Status Domain::ReplaceScore(const RigClaim& claim,
+                                  std::int64_t active,
                                   const SegmentKey& key,
                                   const SegmentInformation& information,
                                   const SegmentEnds& ends) {
   return ChangeOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
-    return server::ReplaceScore(tx, key, information, ends);
+    return server::ReplaceScore(tx, active, key, information, ends);
   });
 }
 

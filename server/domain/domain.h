@@ -99,8 +99,11 @@ class Domain {
       const std::optional<SegmentEnds>& ends = std::nullopt);
 
   // Replaces the score of a scored segment by a later one, also in the tables
-  // that hold it. Changes nothing if its data is gone.
+  // that hold it. Changes nothing if its data is gone. FAILED_PRECONDITION
+  // unless `active` is the active version: another activation has scores of its
+  // own.
   absl::Status ReplaceScore(const RigClaim& claim,
+                            std::int64_t active,
                             const SegmentKey& key,
                             const SegmentInformation& information,
                             const SegmentEnds& ends);

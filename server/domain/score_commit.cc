@@ -1,5 +1,7 @@
 #include "server/domain/score_commit.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "server/domain/admission.h"
@@ -9,6 +11,7 @@
 #include "server/domain/retention.h"
 #include "server/domain/run_creation.h"
 #include "server/status/status_macros.h"
+#include "server/store/calibrations.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_rows.h"
 #include "server/store/table_rows.h"
@@ -71,9 +74,18 @@ absl::StatusOr<ScoreCommit> CommitScore(
 }
 
 absl::Status ReplaceScore(UnitOfWork* tx,
+                          std::int64_t active,
                           const SegmentKey& key,
                           const SegmentInformation& information,
                           const SegmentEnds& ends) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t now_active, ActiveVersion(tx));
+  if (now_active != active) {
+    return absl::FailedPreconditionError(
+        fmt::format("version {} of rig {} is active by now, not {}",
+                    now_active,
+                    tx->rig(),
+                    active));
+  }
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
   SELFCAL_ASSIGN_OR_RETURN(const bool has_data, HasData(tx, segment.sequence));

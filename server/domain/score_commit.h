@@ -36,6 +36,7 @@ absl::StatusOr<ScoreCommit> CommitScore(
 
 // Domain::ReplaceScore.
 absl::Status ReplaceScore(UnitOfWork* tx,
+                          std::int64_t active,
                           const SegmentKey& key,
                           const SegmentInformation& information,
                           const SegmentEnds& ends);

@@ -241,7 +241,7 @@ class PipelineImpl : public Pipeline {
     if (update.rescore) {
       SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
                                store_->GetActiveCalibration(rig));
-      RescoreKept(domain_, estimators_, rig, active.theta);
+      RescoreKept(domain_, estimators_, rig, active.version, active.theta);
     }
     return std::move(update.rig);
   }
@@ -320,7 +320,7 @@ class PipelineImpl : public Pipeline {
                  rig,
                  reason);
     calibration_watchers_.Publish(active);
-    RescoreKept(domain_, estimators_, rig, active.theta);
+    RescoreKept(domain_, estimators_, rig, active.version, active.theta);
     return active;
   }
 

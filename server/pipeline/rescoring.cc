@@ -15,6 +15,7 @@ namespace {
 absl::Status TryRescore(Domain* domain,
                         const Estimators& estimators,
                         const RigClaim& claim,
+                        std::int64_t active,
                         const Calibration& theta) {
   const std::string& rig_id = claim.rig;
   Store* const store = domain->store();
@@ -30,6 +31,7 @@ absl::Status TryRescore(Domain* domain,
     SELFCAL_RETURN_IF_ERROR(segment.status());
     SELFCAL_RETURN_IF_ERROR(
         domain->ReplaceScore(claim,
+                             active,
                              stored.key,
                              estimators.score(rig.rig, theta, *segment),
                              estimators.ends(rig.rig, theta, *segment)));
@@ -42,11 +44,12 @@ absl::Status TryRescore(Domain* domain,
 void RescoreKept(Domain* domain,
                  const Estimators& estimators,
                  const RigClaim& claim,
+                 std::int64_t active,
                  const Calibration& theta) {
   if (!estimators.ends) return;
   absl::Status status;
   try {
-    status = TryRescore(domain, estimators, claim, theta);
+    status = TryRescore(domain, estimators, claim, active, theta);
   } catch (const std::exception& error) {
     status = absl::InternalError(error.what());
   }

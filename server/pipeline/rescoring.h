@@ -1,7 +1,7 @@
 // Scores of kept segments at the present calibration.
 #pragma once
 
-#include <string>
+#include <cstdint>
 
 #include "core/model/calibration.h"
 #include "server/domain/domain.h"
@@ -10,15 +10,17 @@
 
 namespace selfcal::server {
 
-// Scores again, at `theta`, all scored segments of the rig whose data is kept.
-// `theta` is the calibration that is active or about to be. Tables, change
-// detection and predictions then rest on it, and the ends of a segment that
-// loses its data were linearised near it. Segments whose data is damaged or
-// gone keep their scores; any other error ends the rescoring and is logged.
-// Does nothing if the estimators compute no ends.
+// Scores again, at `theta`, all scored segments of the rig whose data is kept,
+// as long as the version `active` is active. `theta` is this version, or a
+// candidate that is about to take its place. Tables, change detection and
+// predictions then rest on it, and the ends of a segment that loses its data
+// were linearised near it. Segments whose data is damaged or gone keep their
+// scores; any other error, and another active version, end the rescoring and
+// are logged. Does nothing if the estimators compute no ends.
 void RescoreKept(Domain* domain,
                  const Estimators& estimators,
                  const RigClaim& claim,
+                 std::int64_t active,
                  const Calibration& theta);
 
 }  // namespace selfcal::server

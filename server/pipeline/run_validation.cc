@@ -212,8 +212,11 @@ absl::StatusOr<StoredCalibration> ValidateAndFinish(
     // whoever sees the version sees the scores at it.
     const bool becomes_active = candidate.state == CalibrationState::kActive;
     if (becomes_active) {
-      RescoreKept(
-          context.domain, context.estimators, context.claim, candidate.theta);
+      RescoreKept(context.domain,
+                  context.estimators,
+                  context.claim,
+                  candidate.validation->active_version,
+                  candidate.theta);
     }
     auto finished =
         context.domain->FinishRun(context.claim, run.run, candidate);
@@ -222,8 +225,11 @@ absl::StatusOr<StoredCalibration> ValidateAndFinish(
         finished->state != CalibrationState::kActive) {
       SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
                                context.store()->GetActiveCalibration(run.rig));
-      RescoreKept(
-          context.domain, context.estimators, context.claim, active.theta);
+      RescoreKept(context.domain,
+                  context.estimators,
+                  context.claim,
+                  active.version,
+                  active.theta);
     }
     return finished;
   }

@@ -127,7 +127,7 @@ TEST_P(RememberedTest, ALaterScoreTakesThePlaceOfTheFirst) {
   SegmentInformation better = FakeInformation(rig_, -70.0, 6.0);
   better.theta0.cameras[0].f.x() += 1;
   const SegmentEnds ends = FakeEnds(rig_, {"s", 1});
-  ASSERT_TRUE(domain_->ReplaceScore("a", {"s", 1}, better, ends).ok());
+  ASSERT_TRUE(domain_->ReplaceScore("a", 1, {"s", 1}, better, ends).ok());
   const auto segment = store_->GetSegment("a", {"s", 1});
   ASSERT_TRUE(segment.ok() && segment->information);
   EXPECT_EQ(segment->information->theta0.cameras[0].f.x(),
@@ -148,6 +148,7 @@ TEST_P(RememberedTest, NoScoreTakesThePlaceWhereTheDataIsGone) {
   ASSERT_FALSE(HasData("a", 2));
   ASSERT_TRUE(domain_
                   ->ReplaceScore("a",
+                                 1,
                                  {"s", 2},
                                  FakeInformation(rig_, -99.0),
                                  FakeEnds(rig_, {"s", 99}))
@@ -156,7 +157,36 @@ TEST_P(RememberedTest, NoScoreTakesThePlaceWhereTheDataIsGone) {
             50.0);
   EXPECT_THAT(Remembered(), ::testing::Contains(std::pair(2, true)));
   EXPECT_TRUE(absl::IsNotFound(domain_->ReplaceScore(
-      "a", {"s", 77}, FakeInformation(rig_, 1), FakeEnds(rig_, {"s", 77}))));
+      "a", 1, {"s", 77}, FakeInformation(rig_, 1), FakeEnds(rig_, {"s", 77}))));
+}
+
+// One that was begun before another version became active.
+TEST_P(RememberedTest, NoScoreOfAnotherVersionTakesThePlaceOfTheFirst) {
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
+  StoredCalibration next;
+  next.state = CalibrationState::kActive;
+  next.theta = rig_.factory;
+  const int size = TangentSize(next.theta);
+  next.covariance = Eigen::MatrixXd::Identity(size, size);
+  ASSERT_TRUE(domain_->FinishRun("a", 1, next).ok());
+  const auto replace = [&](std::int64_t active) {
+    return domain_->ReplaceScore("a",
+                                 active,
+                                 {"s", 1},
+                                 FakeInformation(rig_, -70.0 - active, 6.0),
+                                 FakeEnds(rig_, {"s", 1}));
+  };
+  const auto entropy = [&] {
+    return store_->GetSegment("a", {"s", 1})->information->groups[0].entropy;
+  };
+  const double before = entropy();
+  EXPECT_TRUE(absl::IsFailedPrecondition(replace(1)));
+  EXPECT_EQ(entropy(), before);
+  EXPECT_TRUE(replace(2).ok());
+  EXPECT_EQ(entropy(), -72.0);
+  ASSERT_TRUE(domain_->ActivateCalibration("a", 1, "me", "back").ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(replace(2)));
+  EXPECT_TRUE(replace(1).ok());
 }
 
 SELFCAL_STORE_TEST_SUITE(RememberedTest);
