@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <fstream>
 #include <future>
-#include <limits>
 #include <map>
 #include <string>
 #include <system_error>
@@ -92,12 +91,11 @@ void AddTimes(Store* store,
 
 void AddQueue(Store* store, std::vector<MetricFamily>* families) {
   Gauge queue("selfcal_queue_length", "Segments that wait to be scored.");
-  const auto unscored = store->ListUnscored(std::numeric_limits<int>::max());
-  if (unscored.ok()) queue.Add({}, static_cast<double>(unscored->size()));
+  const auto work = store->CountWork();
+  if (work.ok()) queue.Add({}, static_cast<double>(work->segments));
   families->push_back(queue.Take());
   Gauge runs("selfcal_unfinished_runs", "Runs that are pending or running.");
-  const auto unfinished = store->ListUnfinishedRuns();
-  if (unfinished.ok()) runs.Add({}, static_cast<double>(unfinished->size()));
+  if (work.ok()) runs.Add({}, static_cast<double>(work->runs));
   families->push_back(runs.Take());
 }
 

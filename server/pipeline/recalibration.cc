@@ -4,7 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <limits>
+#include <chrono>
 #include <set>
 #include <utility>
 
@@ -16,6 +16,10 @@ namespace {
 
 // Versions from before estimates were stored that get them at once.
 constexpr int kEstimates = 1000;
+
+// How often devices are looked for that have become silent: they are so for a
+// day.
+constexpr std::chrono::minutes kSilentInterval{1};
 
 }  // namespace
 
@@ -197,23 +201,22 @@ absl::Status Recalibrator::StartDueRuns() {
   const std::int64_t now_ns = shared_.options.now_ns();
   if (is_first) {
     SELFCAL_RETURN_IF_ERROR(shared_.domain->StartTimedRuns(now_ns).status());
-    SELFCAL_RETURN_IF_ERROR(shared_.domain->NoteSilentDevices());
+    const auto now = SessionEnds::Clock::now();
+    if (now >= look_for_silent_) {
+      SELFCAL_RETURN_IF_ERROR(shared_.domain->NoteSilentDevices());
+      look_for_silent_ = now + kSilentInterval;
+    }
     if (!estimates_complete_) {
       SELFCAL_ASSIGN_OR_RETURN(const int written,
                                shared_.domain->CompleteEstimates(kEstimates));
       estimates_complete_ = written == 0;
     }
   }
-  std::set<std::string> busy;
+  std::vector<std::string> ended = sessions_.Due(SessionEnds::Clock::now());
   SELFCAL_ASSIGN_OR_RETURN(
-      const auto unscored,
-      shared_.store()->ListUnscored(std::numeric_limits<int>::max()));
-  for (const auto& segment : unscored) busy.insert(segment.rig);
-  SELFCAL_ASSIGN_OR_RETURN(const auto runs,
-                           shared_.store()->ListUnfinishedRuns());
-  for (const StoredRun& run : runs) busy.insert(run.rig);
-  const std::vector<std::string> ended =
-      sessions_.Due(SessionEnds::Clock::now(), busy);
+      const std::set<std::string> busy,
+      shared_.store()->FindBusyRigs({ended.begin(), ended.end()}));
+  std::erase_if(ended, [&](const auto& rig) { return busy.contains(rig); });
 
   const std::chrono::nanoseconds idle = shared_.options.session_idle;
   const std::int64_t idle_since_ns =

@@ -88,8 +88,9 @@ class Recalibrator {
   const RunContext shared_;  // without a current run
   Watchers<StoredCalibration>* const calibration_watchers_;
   SessionEnds sessions_;
-  std::mutex starting_;              // one thread at a time creates runs
-  bool estimates_complete_ = false;  // guarded by starting_
+  std::mutex starting_;  // one thread at a time creates runs; guards these:
+  bool estimates_complete_ = false;
+  SessionEnds::Clock::time_point look_for_silent_{};  // at this time again
   std::vector<std::unique_ptr<Executor>> executors_;
 
   // The executor of each rig's run, from before it begins until after its end.

@@ -29,12 +29,11 @@ SessionEnds::Clock::time_point SessionEnds::NextDue(
   return next;
 }
 
-std::vector<std::string> SessionEnds::Due(
-    Clock::time_point now, const std::set<std::string>& busy) const {
+std::vector<std::string> SessionEnds::Due(Clock::time_point now) const {
   std::vector<std::string> ended;
   const std::lock_guard lock(mutex_);
   for (const auto& [rig, due] : due_) {
-    if (due <= now && !busy.contains(rig)) ended.push_back(rig);
+    if (due <= now) ended.push_back(rig);
   }
   return ended;
 }

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <map>
 #include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -24,9 +23,8 @@ class SessionEnds {
   // The first due time after `now`; `latest` if there is none before it.
   Clock::time_point NextDue(Clock::time_point now,
                             Clock::time_point latest) const;
-  // Rigs whose run is due, except busy ones.
-  std::vector<std::string> Due(Clock::time_point now,
-                               const std::set<std::string>& busy) const;
+  // Rigs whose run is due.
+  std::vector<std::string> Due(Clock::time_point now) const;
 
  private:
   mutable std::mutex mutex_;

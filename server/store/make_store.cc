@@ -20,6 +20,7 @@
 #include "server/store/payload.h"
 #include "server/store/replicas.h"
 #include "server/store/rig_lists.h"
+#include "server/store/rig_work.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
@@ -238,6 +239,15 @@ class DatabaseStore final : public Store {
       const std::string& replica) override {
     return Read(
         [&](Connection* db) { return ListUnfinishedRunRows(db, replica); });
+  }
+
+  absl::StatusOr<WorkCount> CountWork() override {
+    return Read([&](Connection* db) { return CountWorkRows(db); });
+  }
+
+  absl::StatusOr<std::set<std::string>> FindBusyRigs(
+      const std::set<std::string>& rigs) override {
+    return Read([&](Connection* db) { return BusyRigs(db, rigs); });
   }
 
   absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,

@@ -404,7 +404,8 @@ class Store {
   // Exclusions of the segment, as far as they were recorded.
   virtual absl::StatusOr<std::vector<Exclusion>> ListExclusions(
       const std::string& rig, const SegmentKey& key) = 0;
-  // Unscored segments of these rigs, or of those that a replica has claimed.
+  // Unscored segments of the rigs that no device reports, or of those that a
+  // replica has claimed.
   // Those of one rig follow each other, in the order of their arrival.
   struct Unscored {
     std::string rig;
@@ -455,10 +456,19 @@ class Store {
   // steady time.
   virtual absl::StatusOr<Listed<StoredRun>> ListRuns(
       const std::string& rig, const Page& page, const RigQuery& of = {}) = 0;
-  // Pending and running runs of these rigs, or of those that a replica has
-  // claimed, oldest first. After a restart, a running one starts again.
+  // Pending and running runs of the rigs that no device reports, or of those
+  // that a replica has claimed, oldest first. After a restart, a running one
+  // starts again.
   virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns(
       const std::string& replica = "") = 0;
+  // How many of both there are, and those of these rigs that have some.
+  struct WorkCount {
+    std::int64_t segments = 0;
+    std::int64_t runs = 0;
+  };
+  virtual absl::StatusOr<WorkCount> CountWork() = 0;
+  virtual absl::StatusOr<std::set<std::string>> FindBusyRigs(
+      const std::set<std::string>& rigs) = 0;
 
   // --- Instructions for the device of a rig, newest first.
   virtual absl::StatusOr<Listed<StoredInstruction>> ListInstructions(

@@ -183,6 +183,9 @@ TEST_P(ReportsTest, HubHasWhatTheDeviceHas) {
   // The hub computes nothing of it.
   EXPECT_THAT(*store_->ListUnscored(10), IsEmpty());
   EXPECT_THAT(*store_->ListUnfinishedRuns(), IsEmpty());
+  EXPECT_EQ(store_->CountWork()->segments, 0);
+  EXPECT_EQ(store_->CountWork()->runs, 0);
+  EXPECT_THAT(*store_->FindBusyRigs({"a"}), IsEmpty());
   EXPECT_THAT(*domain_->StartTimedRuns(NowNs()), IsEmpty());
   EXPECT_THAT(*domain_->StartSessionRuns({}, NowNs()), IsEmpty());
   for (const RigCheck check : {RigCheck::kTime, RigCheck::kSession}) {

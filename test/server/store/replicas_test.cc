@@ -172,6 +172,26 @@ TEST_P(ReplicasTest, ListsTheWorkOfAReplica) {
   EXPECT_EQ(store_->CountUnscored("a").value(), 1);
 }
 
+TEST_P(ReplicasTest, WorkIsCountedAndFoundByRig) {
+  for (const char* rig : {"a", "b", "c", "d"}) CreateTestRig(rig);
+  for (const char* rig : {"a", "c", "d"}) Put(rig, 0);
+  Put("a", 1);
+  ASSERT_TRUE(Score("c", 0).ok());
+  ASSERT_TRUE(domain_->CreateManualRun("c").ok());
+  const auto work = store_->CountWork();
+  ASSERT_TRUE(work.ok()) << work.status();
+  EXPECT_EQ(work->segments, 3);
+  EXPECT_EQ(work->runs, 1);
+  const auto busy = store_->FindBusyRigs({"a", "b", "c", "nobody"});
+  ASSERT_TRUE(busy.ok()) << busy.status();
+  EXPECT_EQ(*busy, (std::set<std::string>{"a", "c"}));
+  EXPECT_TRUE(store_->FindBusyRigs({})->empty());
+  std::set<std::string> many;
+  for (int k = 0; k < 2500; ++k) many.insert("n" + std::to_string(k));
+  many.insert({"a", "d", "z"});
+  EXPECT_EQ(*store_->FindBusyRigs(many), (std::set<std::string>{"a", "d"}));
+}
+
 TEST_P(ReplicasTest, OnlyARecordThatDoesNotBeatIsRemoved) {
   Begin("one");
   const auto before = replicas()->List();
