@@ -70,19 +70,29 @@ absl::Status ChangeOnly(Store* store,
   });
 }
 
-// Change, unless a device reports the rig.
+// The work, unless a device reports the rig.
+template <typename Work>
+auto OnOwnRig(const Work& work) {
+  return [&work](UnitOfWork* tx) -> std::invoke_result_t<Work, UnitOfWork*> {
+    SELFCAL_RETURN_IF_ERROR(CheckOwnRig(tx));
+    return work(tx);
+  };
+}
+
 template <typename Work>
 auto ChangeOwnRig(Store* store,
-                  const std::string& rig,
+                  const RigClaim& claim,
                   const Moment& now,
                   const Work& work) -> std::invoke_result_t<Work, UnitOfWork*> {
-  return Change(store,
-                rig,
-                now,
-                [&](UnitOfWork* tx) -> std::invoke_result_t<Work, UnitOfWork*> {
-                  SELFCAL_RETURN_IF_ERROR(CheckOwnRig(tx));
-                  return work(tx);
-                });
+  return Change(store, claim, now, OnOwnRig(work));
+}
+
+template <typename Work>
+absl::Status ChangeOwnRigOnly(Store* store,
+                              const RigClaim& claim,
+                              const Moment& now,
+                              const Work& work) {
+  return ChangeOnly(store, claim, now, OnOwnRig(work));
 }
 
 using CheckRig = absl::StatusOr<std::optional<StoredRun>> (*)(
@@ -208,7 +218,7 @@ absl::StatusOr<ScoreCommit> Domain::CommitScore(
                            InspectFor(store_, claim.rig, [&](UnitOfWork* tx) {
                              return DecideJointly(tx, key, information);
                            }));
-  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::CommitScore(
         tx, key, information, ends, decided, options_.change);
   });
@@ -219,7 +229,7 @@ absl::Status Domain::ReplaceScore(const RigClaim& claim,
                                   const SegmentKey& key,
                                   const SegmentInformation& information,
                                   const SegmentEnds& ends) {
-  return ChangeOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRigOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::ReplaceScore(tx, active, key, information, ends);
   });
 }
@@ -227,7 +237,7 @@ absl::Status Domain::ReplaceScore(const RigClaim& claim,
 absl::Status Domain::MarkUnusable(const RigClaim& claim,
                                   const SegmentKey& key,
                                   const std::string& problem) {
-  return ChangeOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRigOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::MarkUnusable(tx, key, problem);
   });
 }
@@ -300,7 +310,7 @@ absl::StatusOr<int> Domain::CompleteEstimates(int limit) {
 absl::Status Domain::ReportDisagreement(const std::string& rig,
                                         std::int64_t version,
                                         const std::string& finding) {
-  return ChangeOnly(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRigOnly(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::ReportDisagreement(tx, version, finding);
   });
 }
@@ -385,21 +395,21 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
 absl::Status Domain::DeferRun(const RigClaim& claim,
                               std::int64_t run,
                               const std::string& reason) {
-  return ChangeOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRigOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::DeferRun(tx, run, reason);
   });
 }
 
 absl::StatusOr<StoredRun> Domain::BeginRun(const RigClaim& claim,
                                            std::int64_t run) {
-  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::BeginRun(tx, run);
   });
 }
 
 absl::StatusOr<StoredRun> Domain::ReleaseRun(const RigClaim& claim,
                                              std::int64_t run) {
-  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::ReleaseRun(tx, run);
   });
 }
@@ -408,7 +418,7 @@ absl::StatusOr<StoredCalibration> Domain::StoreCandidate(
     const RigClaim& claim,
     std::int64_t run,
     const StoredCalibration& calibration) {
-  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::StoreCandidate(tx, run, calibration);
   });
 }
@@ -417,7 +427,7 @@ absl::StatusOr<StoredCalibration> Domain::FinishRun(
     const RigClaim& claim,
     std::int64_t run,
     const StoredCalibration& calibration) {
-  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::FinishRun(tx, run, calibration, options_.change);
   });
 }
@@ -426,7 +436,7 @@ absl::StatusOr<StoredRun> Domain::EndRun(const RigClaim& claim,
                                          std::int64_t run,
                                          RunState state,
                                          const std::string& message) {
-  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::EndRun(tx, run, state, message);
   });
 }

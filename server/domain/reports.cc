@@ -49,7 +49,7 @@ absl::Status CheckOwnRig(UnitOfWork* tx) {
   SELFCAL_ASSIGN_OR_RETURN(const auto device, ReadReportingDevice(tx));
   if (!device) return absl::OkStatus();
   return absl::FailedPreconditionError(
-      fmt::format("rig {} is reported by its device, where it can be changed; "
+      fmt::format("rig {} is reported by its device: do this on the device; "
                   "this hub has a copy of its records",
                   tx->rig()));
 }

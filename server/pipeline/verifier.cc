@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "server/domain/reports.h"
 #include "server/pipeline/run_options.h"
 #include "server/pipeline/stored_information.h"
 #include "server/status/status_macros.h"
@@ -51,6 +52,8 @@ absl::StatusOr<Verification> Verifier::VerifyRig(
     return absl::FailedPreconditionError(
         "another verification is under way; try again when it is done");
   }
+  // What it finds is recorded with the rig.
+  SELFCAL_RETURN_IF_ERROR(store_->Inspect(rig_name, CheckOwnRig));
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(rig_name));
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
                            store_->GetActiveCalibration(rig_name));

@@ -57,6 +57,17 @@ class ReportsTest : public StoreTest {
     ASSERT_TRUE(scored.ok()) << scored.status();
   }
 
+  // The first run of the rig, whose candidate is not validated yet.
+  void StoreCandidateOnDevice(const Rig& rig) {
+    ASSERT_TRUE(device_domain_->CreateManualRun(rig.id).ok());
+    ASSERT_TRUE(device_domain_->BeginRun(rig.id, 1).ok());
+    StoredCalibration candidate =
+        TestCalibration(rig, *device_->GetRun(rig.id, 1));
+    candidate.state = CalibrationState::kCandidate;
+    const auto stored = device_domain_->StoreCandidate(rig.id, 1, candidate);
+    ASSERT_TRUE(stored.ok()) << stored.status();
+  }
+
   void ReportNewRigs(ReportedData data) {
     const auto rigs = device_->outbox()->ListUnreported();
     ASSERT_TRUE(rigs.ok()) << rigs.status();
@@ -375,12 +386,30 @@ TEST_P(ReportsTest, DeletedRigIsDeletedAtTheHubAndItsEventsRemain) {
 TEST_P(ReportsTest, RigOfADeviceCannotBeChangedAtTheHub) {
   const Rig rig = CreateDeviceRig("a");
   PutOnDevice(rig, 0);
+  ScoreOnDevice(rig, 0, 1.0);
+  PutOnDevice(rig, 1);
+  StoreCandidateOnDevice(rig);
   ReportAll();
   const auto same = [](const StoredRig& stored) -> absl::StatusOr<StoredRig> {
     return stored;
   };
+  const SegmentKey scored = {"s", 0};
+  const SegmentKey unscored = {"s", 1};
+  const SegmentInformation score = FakeInformation(rig, 1.0);
+  const StoredCalibration result =
+      TestCalibration(rig, *store_->GetRun("a", 1));
   for (const absl::Status& status :
-       {domain_->PutSegment("a", Segment(1)).status(),
+       {domain_->PutSegment("a", Segment(2)).status(),
+        domain_->CommitScore("a", unscored, score).status(),
+        domain_->ReplaceScore("a", 1, scored, score, {}),
+        domain_->MarkUnusable("a", scored, "x"),
+        domain_->DeferRun("a", 1, "x"),
+        domain_->BeginRun("a", 1).status(),
+        domain_->ReleaseRun("a", 1).status(),
+        domain_->StoreCandidate("a", 1, result).status(),
+        domain_->FinishRun("a", 1, result).status(),
+        domain_->EndRun("a", 1, RunState::kCancelled, "x").status(),
+        domain_->ReportDisagreement("a", 1, "x"),
         domain_->UpdateRig("a", same, "eve").status(),
         domain_->DeleteSegment("a", {"s", 0}, "eve", "x").status(),
         domain_->QuarantineSegments("a", "s", 0, "eve", "x").status(),
@@ -389,6 +418,28 @@ TEST_P(ReportsTest, RigOfADeviceCannotBeChangedAtTheHub) {
     EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
     EXPECT_THAT(std::string(status.message()), HasSubstr("by its device"));
   }
+  const auto started = domain_->StartSessionRuns({"a"}, NowNs());
+  ASSERT_TRUE(started.ok()) << started.status();
+  EXPECT_THAT(*started, IsEmpty());
+  ExpectSame("a");
+}
+
+TEST_P(ReportsTest, RunThatIsCancelledAtTheHubContinuesOnTheDevice) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  ScoreOnDevice(rig, 0, 1.0);
+  StoreCandidateOnDevice(rig);
+  ReportAll();
+  const auto cancelled =
+      domain_->EndRun("a", 1, RunState::kCancelled, "cancelled on request");
+  EXPECT_TRUE(absl::IsFailedPrecondition(cancelled.status()))
+      << cancelled.status();
+  const auto finished = device_domain_->FinishRun(
+      "a", 1, TestCalibration(rig, *device_->GetRun("a", 1)));
+  ASSERT_TRUE(finished.ok()) << finished.status();
+  ReportAll();
+  EXPECT_EQ(anew_, 0);
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, 2);
   ExpectSame("a");
 }
 

@@ -7,6 +7,7 @@
 #include "core/information/segment_information.h"
 #include "server/pipeline/verification_sampler.h"
 #include "server/pipeline/verifier.h"
+#include "server/store/report.h"
 #include "test/server/pipeline/fake_conditions.h"
 #include "test/server/pipeline/pipeline_test.h"
 
@@ -263,6 +264,23 @@ TEST_F(VerificationTest, OneAtATimeAndItEndsWhenItIsInterrupted) {
   pipeline_->Stop();
   second.join();
   EXPECT_TRUE(absl::IsCancelled(first)) << first;
+}
+
+TEST_F(VerificationTest, RigOfADeviceIsVerifiedThere) {
+  SubmitSegments();
+  const absl::Status reported = store_->Transact("a", 1, [](UnitOfWork* tx) {
+    return WriteReportingDevice(tx,
+                                {.key = 1,
+                                 .report = 1,
+                                 .time_ns = 1,
+                                 .waiting = 0,
+                                 .program_version = ""});
+  });
+  ASSERT_TRUE(reported.ok()) << reported;
+  const auto verification = Verify();
+  EXPECT_TRUE(absl::IsFailedPrecondition(verification.status()));
+  EXPECT_THAT(std::string(verification.status().message()),
+              HasSubstr("do this on the device"));
 }
 
 TEST_F(VerificationTest, AShareIsVerifiedWhileTheDeviceIsIdle) {
