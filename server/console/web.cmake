@@ -83,8 +83,9 @@ if(SELFCAL_HAS_CONSOLE)
   set(SELFCAL_CONSOLE_ASSETS ${CMAKE_CURRENT_BINARY_DIR}/assets.cc)
   set(SELFCAL_CONSOLE_DIST ${web}/dist)
   configure_file(assets.cc.in ${SELFCAL_CONSOLE_ASSETS} @ONLY)
+  # Compiled as one with others, the object would not depend on the pages.
   set_source_files_properties(${SELFCAL_CONSOLE_ASSETS} PROPERTIES
-    OBJECT_DEPENDS "${built}")
+    OBJECT_DEPENDS "${built}" SKIP_UNITY_BUILD_INCLUSION ON)
 endif()
 # Variables for the tests.
 set(SELFCAL_HAS_CONSOLE ${SELFCAL_HAS_CONSOLE} CACHE INTERNAL "")
