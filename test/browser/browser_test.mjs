@@ -151,6 +151,10 @@ const tests = {
     await plot.scrollIntoViewIfNeeded();
     await plot.hover();
     await r.sees(/keyframe ([2-9]|1\d) of 20/);
+    // All times are since the first keyframe, before which there are readings.
+    await plot.focus();
+    await r.page.keyboard.press('Home');
+    await r.sees(/^Time: -?0\.00\d s, keyframe 1 of 20/);
     await r.page.getByRole('heading', { name: 'Motion' }).scrollIntoViewIfNeeded();
     await r.page.mouse.wheel(0, 300);
     await r.page.waitForTimeout(300);

@@ -14,10 +14,11 @@ interface Shown {
   data: SegmentData;
   residuals: SegmentResiduals;
   keyframe: number;
-  end: number; // of the time axis, as in the plots of the IMU [s]
+  range: [number, number]; // of the time axis, as in the plots of the IMU [s]
   onKeyframe: (keyframe: number) => void;
 }
 
+// Since the first keyframe.
 function secondsOf(times: string[]): number[] {
   const start = BigInt(times[0]);
   return times.map((time) => Number(BigInt(time) - start) / 1e9);
@@ -59,7 +60,7 @@ function Reprojections(props: Shown & { camera: number }) {
       label={`Reprojection residuals of camera ${props.camera} in pixels, by time`}
       data={data}
       series={kObservations}
-      x={{ label: 'time [s]', range: [0, props.end] }}
+      x={{ label: 'time [s]', range: props.range }}
       y="residual [px]"
       log
       height={220}
@@ -141,7 +142,7 @@ function Intervals(props: Shown & { of: SegmentResiduals_Intervals }) {
         label={`IMU residuals of each interval between keyframes: ${name}`}
         data={data}
         series={whitened ? kKinds : kAxes}
-        x={{ label: 'time [s]', range: [0, props.end] }}
+        x={{ label: 'time [s]', range: props.range }}
         y={whitened ? 'root mean square [sigmas]' : `residual [${unit}]`}
         height={220}
         cursor={Math.min(props.keyframe, data[0].length - 1)}

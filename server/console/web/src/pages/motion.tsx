@@ -264,7 +264,8 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
   );
   // The readings that are shown; `at` is an index into those of the first IMU.
   const shown = chosen === 1 && imu1 ? imu1 : imu;
-  const start = BigInt(imu.tNs[0]);
+  // Times are since the first keyframe; readings begin before it.
+  const start = BigInt(keyframes.tNs[0]);
   const time = BigInt(imu.tNs[at]);
   const gyro = useMemo(() => triple(shown.tNs, shown.gyro, start, kDegrees), [shown, start]);
   const accel = useMemo(() => triple(shown.tNs, shown.accel, start), [shown, start]);
@@ -273,6 +274,10 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
   const keyframe = nearest(keyframes.tNs, time);
   const toKeyframe = (k: number) => setAt(nearest(imu.tNs, BigInt(keyframes.tNs[k])));
   const secondsOf = (t: bigint) => Number(t - start) / 1e9;
+  const range: [number, number] = [
+    secondsOf(BigInt(imu.tNs[0])),
+    secondsOf(BigInt(imu.tNs[imu.tNs.length - 1])),
+  ];
   const cameras = rig.value?.factory?.cameras;
   return (
     <>
@@ -340,7 +345,7 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
             onKeyframe={toKeyframe}
             camera={camera}
             imu={chosen}
-            end={secondsOf(BigInt(imu.tNs[imu.tNs.length - 1]))}
+            range={range}
           />
         )}
       </Loaded>
