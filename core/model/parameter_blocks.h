@@ -163,9 +163,9 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
 };
 
 // The pose of a second IMU, and its time offset, in the order of
-// kMountTangentSize. Prior sigmas of the pose are those of a drawing or a data
-// sheet: 0.5 degrees and 5 mm; that of the offset is that of filters and
-// drivers that differ, 5 ms.
+// kMountTangentSize. The pose has the default prior sigmas, ten reference
+// sigmas: 0.05 rad and 0.13 m along each axis; the offset has that of filters
+// and drivers that differ, 5 ms.
 inline constexpr Block<SecondImuCalibration> kMountBlocks[] = {
     {{.name = "q_JI",
       .field = "q_JI",
