@@ -126,7 +126,8 @@ Verdict VerdictOf(const StoredCalibration& calibration) {
   if (!calibration.disagreement.empty()) {
     return {VerdictKind::kNotTrustworthy, {calibration.disagreement}};
   }
-  if (calibration.changed_since != 0) {
+  if (calibration.state == CalibrationState::kActive &&
+      calibration.changed_since != 0) {
     return {VerdictKind::kNotTrustworthy,
             {fmt::format("The device has changed since (change {}): it is of "
                          "the device before. Record new motion: the next "

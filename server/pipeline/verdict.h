@@ -28,8 +28,8 @@ Verdict MakeVerdict(const Rig& rig,
 // The verdict on a stored version: the one stored with it, except that the
 // factory calibration is kFactory, a rejected version is not trustworthy for
 // the reasons of its rejection, one on which the cores disagree in a
-// verification is not trustworthy for that reason, nor is one of a device that
-// has changed since, and one without a stored verdict is unknown.
+// verification is not trustworthy for that reason, nor is an active one of a
+// device that has changed since, and one without a stored verdict is unknown.
 Verdict VerdictOf(const StoredCalibration& calibration);
 
 // "good", "weak", "not trustworthy", "factory", "unknown".

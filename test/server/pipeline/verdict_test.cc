@@ -56,6 +56,9 @@ TEST(VerdictTest, ThatOfAVersionIsTheStoredOne) {
   version.changed_since = 2;
   EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kNotTrustworthy);
   EXPECT_THAT(VerdictOf(version).sentences, ElementsAre(HasSubstr("change 2")));
+  // It described the device before.
+  version.state = CalibrationState::kSuperseded;
+  EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kGood);
   // The store rejects what no longer holds, whatever was found before.
   version.state = CalibrationState::kRejected;
   version.reasons = {"The device has changed."};
