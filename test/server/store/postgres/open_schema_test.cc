@@ -78,6 +78,42 @@ TEST_F(OpenSchemaTest, NamesOfAllRigsHaveTheirSuffixes) {
   EXPECT_EQ(suffixes("TRUE"), 5);
 }
 
+// Version 9 knows which events are of earlier rigs: of rigs from before it, and
+// of those that an earlier program adds afterwards.
+TEST_F(OpenSchemaTest, RigsKnowTheEventsOfEarlierRigs) {
+  const auto all = PostgresMigrations();
+  const std::vector<Migration> before(all.begin(), all.begin() + 8);
+  ASSERT_TRUE(OpenWith(before).ok());
+  const auto add = [&](const std::string& key, const std::string& name) {
+    return db_->Execute(
+        "INSERT INTO rigs (rig, id, create_time_ns, definition, sha256) "
+        "VALUES (" +
+        key + ", '" + name + "', 0, '', '')");
+  };
+  const auto append = [&](const std::string& name, int number, int kind) {
+    return db_->Execute("INSERT INTO events VALUES ('" + name + "', " +
+                        std::to_string(number) + ", 0, 0, " +
+                        std::to_string(kind) + ", '')");
+  };
+  constexpr int kCreated = 1;
+  constexpr int kDeleted = 15;
+  ASSERT_TRUE(add("7", "a").ok());
+  ASSERT_TRUE(append("a", 1, kCreated).ok());
+  ASSERT_TRUE(append("a", 2, kDeleted).ok());
+  ASSERT_TRUE(append("a", 3, kCreated).ok());
+  ASSERT_TRUE(add("8", "b").ok());
+  ASSERT_TRUE(append("b", 1, kCreated).ok());
+  ASSERT_TRUE(append("c", 1, kCreated).ok());
+  ASSERT_TRUE(OpenWith({all.begin(), all.end()}).ok());
+  ASSERT_TRUE(add("9", "c").ok());
+  const auto earlier = [&](const std::string& name) {
+    return Number("SELECT earlier_events FROM rigs WHERE id = '" + name + "'");
+  };
+  EXPECT_EQ(earlier("a"), 2);
+  EXPECT_EQ(earlier("b"), 0);
+  EXPECT_EQ(earlier("c"), 1);
+}
+
 TEST_F(OpenSchemaTest, AFailedMigrationChangesNothing) {
   ASSERT_TRUE(OpenWith({kFirst, kSecond}).ok());
   const absl::Status status = OpenWith({kFirst, kSecond, kBroken});
