@@ -4,6 +4,7 @@
 #include "server/api/list_parent.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
+#include "server/api/read_rig_query.h"
 #include "server/domain/clock.h"
 #include "server/encode/encode.h"
 #include "server/status/status_macros.h"
@@ -79,13 +80,15 @@ absl::StatusOr<v1::ListEventsResponse> ListEvents(
     const Call& call,
     const v1::ListEventsRequest& request) {
   SELFCAL_ASSIGN_OR_RETURN(
-      const ListParent parent,
+      ListParent parent,
       ReadListParent(call, request.parent(), request.rig_filter()));
   if (!parent.rig.empty()) {
     const absl::Status found = context.store->GetRig(parent.rig).status();
     if (!found.ok()) {
       return About(found, {kRigType, request.parent(), "parent"});
     }
+    // Whose rights are limited sees no events of an earlier rig of this name.
+    SELFCAL_RETURN_IF_ERROR(ReadRigQuery(call, "", "", &parent.of));
   }
   const bool newest_first = request.order_by() == "number desc";
   if (!newest_first && !request.order_by().empty() &&

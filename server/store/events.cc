@@ -89,10 +89,12 @@ absl::StatusOr<Listed<StoredEvent>> ListOfMany(Connection* db,
                   kEventColumns,
                   newest_first ? "<" : ">",
                   newest_first ? "DESC" : "ASC",
-                  condition.is_empty() ? ""
-                                       : "AND EXISTS (SELECT 1 FROM rigs r "
-                                         "  WHERE r.id = e.rig AND " +
-                                             condition.sql() + ") "),
+                  condition.is_empty()
+                      ? ""
+                      : "AND EXISTS (SELECT 1 FROM rigs r "
+                        "  WHERE r.id = e.rig "
+                        "  AND e.event > r.earlier_events AND " +
+                            condition.sql() + ") "),
       place.steady_ns,
       place.rig,
       place.event,
@@ -106,16 +108,20 @@ absl::StatusOr<Listed<StoredEvent>> ListOfMany(Connection* db,
 absl::StatusOr<Listed<StoredEvent>> ListOfRig(Connection* db,
                                               const Page& page,
                                               const std::string& rig,
+                                              bool with_earlier,
                                               bool newest_first) {
   const std::string list = (newest_first ? "newest-events/" : "events/") + rig;
   SELFCAL_ASSIGN_OR_RETURN(const auto number, PageNumber(list, page));
   const int size = PageSize(page);
   Statement read(
       db,
-      fmt::format("{} WHERE rig = ?1 AND event {} ?2 ORDER BY event {} "
+      fmt::format("{} WHERE rig = ?1 AND event {} ?2 {}ORDER BY event {} "
                   "LIMIT ?3",
                   kEventColumns,
                   newest_first ? "<" : ">",
+                  with_earlier ? ""
+                               : "AND event > (SELECT r.earlier_events "
+                                 "  FROM rigs r WHERE r.id = ?1) ",
                   newest_first ? "DESC" : "ASC"),
       rig,
       number.value_or(newest_first ? Limits::max() : 0),
@@ -165,12 +171,45 @@ absl::StatusOr<std::int64_t> InsertEvent(Connection* db,
   }
 }
 
+absl::Status InsertReportedEvent(UnitOfWork* tx, const StoredEvent& event) {
+  const int kind = static_cast<int>(event.kind) + 1;
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t inserted,
+      InsertReturning(tx->db(),
+                      "INSERT INTO events (rig, event, time_ns, steady_ns, "
+                      "  kind, detail) "
+                      "SELECT id, ?2, ?3, ?4, ?5, ?6 FROM rigs "
+                      "WHERE rig = ?1 AND earlier_events < ?2 "
+                      "ON CONFLICT DO NOTHING RETURNING event",
+                      tx->rig_row(),
+                      event.event,
+                      event.time_ns,
+                      event.steady_ns,
+                      kind,
+                      event.detail));
+  if (inserted != 0) return absl::OkStatus();
+  Statement read(tx->db(),
+                 "SELECT 1 FROM events e JOIN rigs r ON r.id = e.rig "
+                 "WHERE r.rig = ?1 AND e.event > r.earlier_events "
+                 "AND e.time_ns = ?2 AND e.steady_ns = ?3 AND e.kind = ?4 "
+                 "AND e.detail = ?5 LIMIT 1",
+                 tx->rig_row(),
+                 event.time_ns,
+                 event.steady_ns,
+                 kind,
+                 event.detail);
+  const bool is_there = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  if (is_there) return absl::OkStatus();
+  return InsertEvent(tx->db(), event).status();
+}
+
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
                                                   const Page& page,
                                                   const std::string& rig,
                                                   const RigQuery& of) {
   return rig.empty() ? ListOfMany(db, page, of, false)
-                     : ListOfRig(db, page, rig, false);
+                     : ListOfRig(db, page, rig, !of.choice, false);
 }
 
 absl::StatusOr<Listed<StoredEvent>> ListNewestEventRows(Connection* db,
@@ -178,7 +217,7 @@ absl::StatusOr<Listed<StoredEvent>> ListNewestEventRows(Connection* db,
                                                         const std::string& rig,
                                                         const RigQuery& of) {
   return rig.empty() ? ListOfMany(db, page, of, true)
-                     : ListOfRig(db, page, rig, true);
+                     : ListOfRig(db, page, rig, !of.choice, true);
 }
 
 }  // namespace selfcal::server

@@ -20,6 +20,11 @@ absl::Status AppendEvent(UnitOfWork* tx,
 absl::StatusOr<std::int64_t> InsertEvent(Connection* db,
                                          const StoredEvent& event);
 
+// Writes an event that the device of the rig reports, unless it was written
+// before. Its number is another one if the device's was given before: to an
+// event of an earlier rig of this name, whose events stay.
+absl::Status InsertReportedEvent(UnitOfWork* tx, const StoredEvent& event);
+
 // Store::ListEvents and ListNewestEvents: of one rig by number, or of those of
 // `of` by steady time if `rig` is empty.
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,

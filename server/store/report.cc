@@ -16,6 +16,7 @@
 #include "server/store/change_rows.h"
 #include "server/store/driver/statement.h"
 #include "server/store/estimates.h"
+#include "server/store/events.h"
 #include "server/store/inventory.h"
 #include "server/store/records.h"
 #include "server/store/reported_rows.h"
@@ -272,6 +273,21 @@ absl::Status ApplyActivation(UnitOfWork* tx,
   return AnnounceCalibration(tx);
 }
 
+absl::Status ApplyEvent(UnitOfWork* tx,
+                        const Record& record,
+                        const Rows& rows) {
+  const ReportedRow* row = RowOf(rows, "events");
+  if (row == nullptr) return BadReport("an event is gone");
+  return InsertReportedEvent(
+      tx,
+      {record.number(),
+       row->Of("time_ns").integer(),
+       tx->rig(),
+       static_cast<EventKind>(row->Of("kind").integer() - 1),
+       row->Of("detail").text(),
+       row->Of("steady_ns").integer()});
+}
+
 // Data that the device does not have any more stays.
 absl::Status ApplyData(UnitOfWork* tx,
                        const Record& record,
@@ -316,11 +332,7 @@ absl::Status ApplyRecord(UnitOfWork* tx,
       return ReadChange(tx, record.number()).status();
     }
     case RecordKind::kEvent:
-      for (const ReportedRow& row : rows) {
-        SELFCAL_RETURN_IF_ERROR(
-            WriteRow(tx, row, record.number(), OnConflict::kKeep));
-      }
-      return absl::OkStatus();
+      return ApplyEvent(tx, record, rows);
     case RecordKind::kData:
       return ApplyData(tx, record, rows, admit_data);
     case RecordKind::kInventory:

@@ -196,10 +196,17 @@ absl::StatusOr<std::vector<std::int64_t>> NumbersOf(UnitOfWork* tx,
     numbers.push_back(0);
     return numbers;
   }
-  Statement read(tx->db(),
-                 fmt::format("SELECT {0} FROM {1} WHERE rig = ?1 ORDER BY {0}",
-                             table->number,
-                             table->name));
+  // Those of an earlier rig of this name are not of this one.
+  const std::string_view condition =
+      kind == RecordKind::kEvent
+          ? "AND event > (SELECT r.earlier_events FROM rigs r WHERE r.id = ?1) "
+          : "";
+  Statement read(
+      tx->db(),
+      fmt::format("SELECT {0} FROM {1} WHERE rig = ?1 {2}ORDER BY {0}",
+                  table->number,
+                  table->name,
+                  condition));
   BindRig(*table, tx, &read);
   while (read.Next()) numbers.push_back(read.Int(0));
   SELFCAL_RETURN_IF_ERROR(read.status());

@@ -17,7 +17,8 @@
 namespace selfcal::server {
 
 // The numbers of the records of a kind, in their order; 0 for a kind of which
-// a rig has one.
+// a rig has one. Of events those of this rig, without any of an earlier one of
+// its name.
 absl::StatusOr<std::vector<std::int64_t>> NumbersOf(UnitOfWork* tx,
                                                     RecordKind kind);
 

@@ -493,7 +493,8 @@ class Store {
 
   // --- Events, oldest or newest first, of one rig or, if `rig` is empty, of
   // those of `of`: of every rig, also those of the daemon and of deleted rigs.
-  // They are only ever appended.
+  // Those of one rig contain the events of earlier rigs of its name, unless
+  // `of` has a choice of rigs. They are only ever appended.
   //
   // Those of one rig are in the order of their numbers, in which they were
   // committed: whoever reads on after the last one misses none. Those of all

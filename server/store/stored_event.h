@@ -30,7 +30,7 @@ enum class EventKind {
 
 struct StoredEvent {
   // Counts from 1 for each name of a rig, over its deletion as well, and for
-  // the daemon.
+  // the daemon. At a hub it may be another one than on the device.
   std::int64_t event = 0;
   std::int64_t time_ns = 0;
   std::string rig;  // empty: of the daemon

@@ -30,7 +30,7 @@ class ReportsTest : public StoreTest {
   void OpenDevice(const DomainOptions& options = {}) {
     device_domain_.reset();
     device_.reset();
-    auto opened = OpenSqliteStore(device_folder_.File("selfcal.db"), 0);
+    auto opened = OpenSqliteStore(device_folder_->File("selfcal.db"), 0);
     ASSERT_TRUE(opened.ok()) << opened.status();
     device_ = *std::move(opened);
     device_domain_.emplace(device_.get(), options);
@@ -66,6 +66,40 @@ class ReportsTest : public StoreTest {
     candidate.state = CalibrationState::kCandidate;
     const auto stored = device_domain_->StoreCandidate(rig.id, 1, candidate);
     ASSERT_TRUE(stored.ok()) << stored.status();
+  }
+
+  void SetLabelOnDevice(const std::string& rig, const std::string& value) {
+    const auto updated = device_domain_->UpdateRig(
+        rig,
+        [&](StoredRig stored) -> absl::StatusOr<StoredRig> {
+          stored.labels["site"] = value;
+          return stored;
+        },
+        "eve");
+    ASSERT_TRUE(updated.ok()) << updated.status();
+  }
+
+  Report NextReport() {
+    const auto report =
+        device_->outbox()->Next(device_->outbox()->List()->front(), kLarge);
+    EXPECT_TRUE(report.ok()) << report.status();
+    return report.value_or(Report());
+  }
+
+  // What the events of a rig say: all, or those that a caller sees who may
+  // read this rig alone.
+  static std::vector<std::string> EventsOf(Store* store,
+                                           const std::string& rig,
+                                           bool is_limited = false) {
+    RigQuery of;
+    if (is_limited) of.choice = RigChoice{{rig}, {}};
+    const auto listed = store->ListEvents({1000, ""}, rig, of);
+    EXPECT_TRUE(listed.ok()) << listed.status();
+    std::vector<std::string> events;
+    for (const StoredEvent& event : listed->items) {
+      events.push_back(std::to_string(event.time_ns) + " " + event.detail);
+    }
+    return events;
   }
 
   void ReportNewRigs(ReportedData data) {
@@ -170,7 +204,7 @@ class ReportsTest : public StoreTest {
     }
   }
 
-  TempFolder device_folder_;
+  std::optional<TempFolder> device_folder_{std::in_place};
   std::unique_ptr<Store> device_;
   std::optional<Domain> device_domain_;
   int anew_ = 0;  // how often the device had to begin anew
@@ -357,6 +391,55 @@ TEST_P(ReportsTest, NumberOfADeletedSegmentMayBeTakenByAnother) {
   EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("a", {"s", 1}).status()));
   EXPECT_TRUE(HasData("a", 2));
   ExpectSame("a", true);
+}
+
+TEST_P(ReportsTest, EventsOfADeviceFollowThoseOfAnEarlierOneOfItsName) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  for (const char* label : {"x", "y", "z"}) SetLabelOnDevice("a", label);
+  ReportAll();
+  const auto earlier = EventsOf(device_.get(), "a");
+  ASSERT_THAT(earlier, SizeIs(5));
+  // The device gets a new database.
+  ASSERT_TRUE(domain_->DeleteRig("a", "eve", "repaired").ok());
+  device_folder_.emplace();
+  OpenDevice();
+  CreateDeviceRig("a");
+  for (int k = 0; k < 7; ++k) {
+    SetLabelOnDevice("a", std::to_string(k));
+    ReportAll();
+  }
+  const auto expect_all = [&] {
+    const auto later = EventsOf(device_.get(), "a");
+    EXPECT_THAT(later, SizeIs(9));
+    auto all = earlier;
+    all.insert(all.end(), later.begin(), later.end());
+    EXPECT_EQ(EventsOf(store_.get(), "a"), all);
+    EXPECT_EQ(EventsOf(store_.get(), "a", true), later);
+  };
+  expect_all();
+  // All events are reported again.
+  ASSERT_TRUE(device_->outbox()->Close().ok());
+  ReportAll();
+  expect_all();
+}
+
+TEST_P(ReportsTest, RigThatComesBackHasAllItsEvents) {
+  CreateDeviceRig("a");
+  ReportAll();
+  ASSERT_TRUE(domain_->DeleteRig("a", "eve", "trial").ok());
+  SetLabelOnDevice("a", "north");
+  ReportAll();
+  EXPECT_EQ(EventsOf(store_.get(), "a", true), EventsOf(device_.get(), "a"));
+}
+
+TEST_P(ReportsTest, EventsOfAnEarlierRigAreNotReportedAsThoseOfALaterOne) {
+  CreateDeviceRig("a");
+  ASSERT_TRUE(device_domain_->DeleteRig("a", "eve", "sold").ok());
+  CreateDeviceRig("a");
+  ReportAll();
+  EXPECT_EQ(EventsOf(store_.get(), "a"), EventsOf(device_.get(), "a", true));
+  EXPECT_THAT(EventsOf(store_.get(), "a"), SizeIs(2));
 }
 
 TEST_P(ReportsTest, DeletedRigIsDeletedAtTheHubAndItsEventsRemain) {

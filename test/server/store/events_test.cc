@@ -11,6 +11,7 @@ namespace selfcal::server {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 class EventsTest : public StoreTest {
@@ -83,6 +84,35 @@ TEST_P(EventsTest, NumbersGoOnInARigThatIsCreatedAgain) {
   EXPECT_THAT(Numbers(List("a")), ElementsAre(1, 2, 3, 4, 5));
   EXPECT_EQ(List("a")[2].kind, EventKind::kRigDeleted);
   EXPECT_EQ(List("a")[3].kind, EventKind::kRigCreated);
+}
+
+TEST_P(EventsTest, LimitedListsHaveOnlyTheEventsOfTheRigThatIsThere) {
+  StoredRig north{TestRig("a"), 0};
+  north.labels["site"] = "north";
+  ASSERT_TRUE(domain_->CreateRig(north).ok());
+  ASSERT_TRUE(domain_->DeleteRig("a", "eve", "sold").ok());
+  RigQuery of_south;
+  of_south.choice = RigChoice{{}, {{"site", "south"}}};
+  const auto numbers = [&](const std::string& rig, const RigQuery& of) {
+    const auto oldest = store_->ListEvents({1000, ""}, rig, of);
+    const auto newest = store_->ListNewestEvents({1000, ""}, rig, of);
+    EXPECT_TRUE(oldest.ok()) << oldest.status();
+    EXPECT_TRUE(newest.ok()) << newest.status();
+    auto reversed = Numbers(newest->items);
+    std::reverse(reversed.begin(), reversed.end());
+    EXPECT_EQ(Numbers(oldest->items), reversed);
+    return Numbers(oldest->items);
+  };
+  for (const char* rig : {"", "a"}) {
+    EXPECT_THAT(numbers(rig, of_south), IsEmpty());
+  }
+  StoredRig south = north;
+  south.labels["site"] = "south";
+  ASSERT_TRUE(domain_->CreateRig(south).ok());
+  for (const char* rig : {"", "a"}) {
+    EXPECT_THAT(numbers(rig, of_south), ElementsAre(4, 5)) << rig;
+    EXPECT_THAT(numbers(rig, {}), ElementsAre(1, 2, 3, 4, 5)) << rig;
+  }
 }
 
 TEST_P(EventsTest, PagesOfAllRigsShowEachOnceThoughTimesAreTheSame) {

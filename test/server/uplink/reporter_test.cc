@@ -2,6 +2,7 @@
 #include "server/uplink/reporter.h"
 
 #include "selfcal/v1/calibration_service.pb.h"
+#include "selfcal/v1/store_service.pb.h"
 #include "server/store/events.h"
 #include "server/store/report.h"
 #include "test/server/uplink/uplink_fixture.h"
@@ -320,6 +321,32 @@ TEST_F(ReporterTest, AnInstructionMustBeAboutItsRig) {
   request.mutable_instruction()->mutable_update_rig()->mutable_rig()->set_name(
       "rigs/own");
   EXPECT_TRUE(absl::IsFailedPrecondition(CallHub(request, &given)));
+}
+
+TEST_F(ReporterTest, ACallerOfALabelSeesNoEventsOfAnEarlierRig) {
+  const auto create = [&](const std::string& site) {
+    StoredRig rig{TestRig("a"), 0};
+    rig.labels["site"] = site;
+    return hub_.domain->CreateRig(rig).status();
+  };
+  ASSERT_TRUE(create("north").ok());
+  ASSERT_TRUE(hub_.domain->DeleteRig("a", "eve", "sold").ok());
+  ASSERT_TRUE(create("south").ok());
+  const auto count = [&](const Grant& grant, const std::string& parent) {
+    v1::ListEventsRequest request;
+    request.set_parent(parent);
+    v1::ListEventsResponse response;
+    const absl::Status status =
+        CallApi(*hub_.api, {"caller", {grant}}, request, &response);
+    EXPECT_TRUE(status.ok()) << status;
+    return response.events_size();
+  };
+  const Grant of_all = {Role::kRead, "", {}};
+  const Grant of_south = {Role::kRead, "", std::pair("site", "south")};
+  for (const char* parent : {"", "rigs/a"}) {
+    EXPECT_EQ(count(of_all, parent), 5);
+    EXPECT_EQ(count(of_south, parent), 2);
+  }
 }
 
 TEST_F(ReporterTest, WatchersAtTheHubSeeWhatIsReported) {
