@@ -23,12 +23,16 @@ absl::StatusOr<DeviceReport> ReadReport(const v1::ReportRequest& request) {
   if (request.number() < 1) {
     return InvalidFields({{"number", "must be positive"}});
   }
+  if (request.attempt() < 0) {
+    return InvalidFields({{"attempt", "must not be negative"}});
+  }
   if (request.program_version().size() > kMaxProgramVersion) {
     return InvalidFields({{"program_version", "is longer than 100 bytes"}});
   }
   DeviceReport report{.rig = *rig,
                       .key = request.key(),
                       .number = request.number(),
+                      .attempt = request.attempt(),
                       .deleted = request.deleted(),
                       .records = request.records(),
                       .waiting = request.waiting(),
@@ -56,6 +60,7 @@ absl::StatusOr<v1::ReportResponse> Report(const ApiContext& context,
   }
   v1::ReportResponse response;
   response.set_begin_anew(answer->begin_anew);
+  response.set_attempt(answer->attempt);
   for (const StoredInstruction& instruction : answer->instructions) {
     SELFCAL_ASSIGN_OR_RETURN(*response.add_instructions(), Encode(instruction));
   }

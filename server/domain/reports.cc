@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "server/domain/alarms.h"
@@ -17,8 +18,10 @@ namespace {
 constexpr int kMaxInstructions = 20;  // in one answer
 constexpr int kMaxPending = 1000;     // for one device
 
+// `newest` is the newest attempt that was taken.
 absl::Status Take(UnitOfWork* tx,
                   const DeviceReport& report,
+                  std::int64_t newest,
                   const Quotas& quotas) {
   SELFCAL_RETURN_IF_ERROR(
       ApplyReport(tx, report.records, [&](std::int64_t bytes) {
@@ -28,6 +31,7 @@ absl::Status Take(UnitOfWork* tx,
       WriteReportingDevice(tx,
                            {.key = report.key,
                             .report = report.number,
+                            .attempt = std::max(newest, report.attempt),
                             .time_ns = tx->time_ns(),
                             .waiting = report.waiting,
                             .program_version = report.program_version}));
@@ -77,12 +81,18 @@ absl::StatusOr<ReportAnswer> TakeReport(UnitOfWork* tx,
         tx->rig(),
         tx->rig()));
   }
+  ReportAnswer answer;
+  if (report.attempt != 0 && report.attempt < device->attempt) {
+    // It comes late, and nobody waits for the answer; or the device does not
+    // know its later attempts any more.
+    answer.attempt = device->attempt;
+    return answer;
+  }
   const bool follows = report.number == 1 || report.number == device->report ||
                        report.number == device->report + 1;
-  ReportAnswer answer;
   answer.begin_anew = !follows;
   if (!follows) return answer;
-  SELFCAL_RETURN_IF_ERROR(Take(tx, report, quotas));
+  SELFCAL_RETURN_IF_ERROR(Take(tx, report, device->attempt, quotas));
   for (const DeviceReport::Result& result : report.results) {
     SELFCAL_RETURN_IF_ERROR(EndInstruction(
         tx,
@@ -99,7 +109,7 @@ absl::Status TakeFirstReport(UnitOfWork* tx,
                              const DeviceReport& report,
                              const Quotas& quotas) {
   SELFCAL_RETURN_IF_ERROR(CheckRigQuota(tx, quotas));
-  return Take(tx, report, quotas);
+  return Take(tx, report, 0, quotas);
 }
 
 absl::StatusOr<StoredInstruction> CreateInstruction(

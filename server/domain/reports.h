@@ -21,6 +21,7 @@ struct DeviceReport {
   std::string rig = {};
   std::int64_t key = 0;  // of the rig in the database of the device
   std::int64_t number = 0;
+  std::int64_t attempt = 0;  // Report::attempt; 0: the device counts none
   bool deleted = false;      // the device has deleted the rig
   std::string records = {};  // Report::records
   std::int64_t waiting = 0;
@@ -38,6 +39,9 @@ struct ReportAnswer {
   // The hub does not have what was reported before, e.g. since it was restored
   // from a backup: the device must report all records anew.
   bool begin_anew = false;
+  // Nothing was taken, since this attempt was before, which is a later one; 0:
+  // there is none.
+  std::int64_t attempt = 0;
   std::vector<StoredInstruction> instructions;  // pending ones, oldest first
 };
 

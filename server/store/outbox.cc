@@ -154,17 +154,42 @@ class OutboxOfDatabase final : public Outbox {
 
   absl::StatusOr<Report> Next(const ReportedRig& rig,
                               std::int64_t max_bytes) override {
+    // Before its records are read: those of a later attempt are newer.
+    std::int64_t attempt = 0;
+    SELFCAL_RETURN_IF_ERROR(
+        WriteInTransaction(db_, [&](Connection* db) -> absl::Status {
+          SELFCAL_ASSIGN_OR_RETURN(
+              attempt,
+              InsertReturning(db,
+                              "UPDATE uplinks SET attempt = attempt + 1 "
+                              "WHERE rig = ?1 RETURNING attempt",
+                              rig.key));
+          return absl::OkStatus();
+        }));
     Report report;
     SELFCAL_RETURN_IF_ERROR(db_->Read([&](Connection* db) -> absl::Status {
       report = Report();
       report.rig = rig.rig;
       report.key = rig.key;
       report.number = rig.report + 1;
+      report.attempt = attempt;
       report.deleted = rig.deleted;
       UnitOfWork tx(db, rig.rig, rig.key, 0);
       return Fill(&tx, max_bytes, &report);
     }));
     return report;
+  }
+
+  absl::Status FollowAttempt(const ReportedRig& rig,
+                             std::int64_t attempt) override {
+    return WriteInTransaction(db_, [&](Connection* db) {
+      return Statement(db,
+                       "UPDATE uplinks SET attempt = ?2 "
+                       "WHERE rig = ?1 AND attempt < ?2",
+                       rig.key,
+                       attempt)
+          .Run();
+    });
   }
 
   absl::Status Confirm(const Report& report, std::int64_t time_ns) override {

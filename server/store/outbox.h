@@ -6,7 +6,9 @@
 // or comes twice does no harm.
 //
 // The reports of a rig are numbered from 1. Number 1 begins anew: all records
-// follow.
+// follow. A report that was not acknowledged is made again with the records as
+// they are by then; its attempts are counted, over all numbers, so that the hub
+// does not take an earlier one after a later one.
 #pragma once
 
 #include <absl/status/status.h>
@@ -42,6 +44,7 @@ struct Report {
   std::string rig;
   std::int64_t key = 0;
   std::int64_t number = 0;
+  std::int64_t attempt = 0;
   bool deleted = false;  // the rig; the records are its last events
   // selfcal.store.ReportedRecords, serialised; empty: there are none.
   std::string records;
@@ -67,10 +70,14 @@ class Outbox {
   virtual absl::Status BeginAnew(const std::string& rig, ReportedData data) = 0;
   // Writes which data is reported from now on, of all rigs that are.
   virtual absl::Status SetData(ReportedData data) = 0;
-  // The next report, with the first records of the outbox: those that come to
-  // about `max_bytes`, but at least one.
+  // The next report, as a new attempt, with the first records of the outbox:
+  // those that come to about `max_bytes`, but at least one.
   virtual absl::StatusOr<Report> Next(const ReportedRig& rig,
                                       std::int64_t max_bytes) = 0;
+  // Has the next attempts to report the rig follow this one, which the hub
+  // knows and this database, restored from a backup, does not.
+  virtual absl::Status FollowAttempt(const ReportedRig& rig,
+                                     std::int64_t attempt) = 0;
   // Removes what the hub has taken, at this time.
   virtual absl::Status Confirm(const Report& report, std::int64_t time_ns) = 0;
   // Reports no rig any more: what changes from now on is not noted.

@@ -380,12 +380,18 @@ absl::StatusOr<StoredRig> RigOfReport(const std::string& bytes,
 absl::StatusOr<std::optional<ReportingDevice>> ReadReportingDevice(
     UnitOfWork* tx) {
   Statement read(tx->db(),
-                 "SELECT device, report, time_ns, waiting, program_version "
+                 "SELECT device, report, attempt, time_ns, waiting, "
+                 "  program_version "
                  "FROM reported_rigs WHERE rig = ?1",
                  tx->rig_row());
   std::optional<ReportingDevice> device;
   if (read.Next()) {
-    device = {read.Int(0), read.Int(1), read.Int(2), read.Int(3), read.Text(4)};
+    device = {read.Int(0),
+              read.Int(1),
+              read.Int(2),
+              read.Int(3),
+              read.Int(4),
+              read.Text(5)};
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return device;
@@ -395,13 +401,15 @@ absl::Status WriteReportingDevice(UnitOfWork* tx,
                                   const ReportingDevice& device) {
   return Statement(
              tx->db(),
-             "INSERT INTO reported_rigs (rig, device, report, time_ns, "
-             "  waiting, program_version) VALUES (?1, ?2, ?3, ?4, ?5, ?6) "
+             "INSERT INTO reported_rigs (rig, device, report, attempt, "
+             "  time_ns, waiting, program_version) "
+             "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7) "
              "ON CONFLICT (rig) DO UPDATE SET device = ?2, report = ?3, "
-             "  time_ns = ?4, waiting = ?5, program_version = ?6",
+             "  attempt = ?4, time_ns = ?5, waiting = ?6, program_version = ?7",
              tx->rig_row(),
              device.key,
              device.report,
+             device.attempt,
              device.time_ns,
              device.waiting,
              device.program_version)

@@ -20,6 +20,8 @@ namespace selfcal::server {
 struct ReportingDevice {
   std::int64_t key = 0;     // of the rig in the database of the device
   std::int64_t report = 0;  // number of the last that was taken
+  // The newest attempt that was taken; 0: the device does not count them.
+  std::int64_t attempt = 0;
   std::int64_t time_ns = 0;
   std::int64_t waiting = 0;  // records that were still to be reported then
   std::string program_version;

@@ -76,6 +76,7 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
   request.set_rig(RigName(rig.rig));
   request.set_key(report.key);
   request.set_number(report.number);
+  request.set_attempt(report.attempt);
   request.set_deleted(report.deleted);
   request.set_records(report.records);
   request.set_waiting(report.waiting);
@@ -102,6 +103,11 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
   }
   known->next = now + Seconds(options_.interval_s);
   ++round->reports;
+  if (response->attempt() > 0) {
+    // The outbox was closed, or restored from a backup.
+    round->waiting += rig.waiting;
+    return outbox->FollowAttempt(rig, response->attempt());
+  }
   if (response->begin_anew()) return BeginAnew(rig.rig, now, known, round);
   if (report.waiting == 0) known->begins_anew = false;
   if (!known->begins_anew) {

@@ -114,6 +114,7 @@ class ReportsTest : public StoreTest {
     return domain_->TakeReport({.rig = report.rig,
                                 .key = report.key,
                                 .number = report.number,
+                                .attempt = report.attempt,
                                 .deleted = report.deleted,
                                 .records = report.records,
                                 .waiting = report.waiting,
@@ -138,7 +139,10 @@ class ReportsTest : public StoreTest {
       const auto answer = Give(*report);
       EXPECT_TRUE(answer.ok()) << answer.status();
       if (!answer.ok()) return 0;
-      if (answer->begin_anew) {
+      if (answer->attempt > 0) {
+        EXPECT_TRUE(
+            device_->outbox()->FollowAttempt(rig, answer->attempt).ok());
+      } else if (answer->begin_anew) {
         ++anew_;
         EXPECT_TRUE(device_->outbox()->BeginAnew(rig.rig, data).ok());
       } else if (!is_lost()) {
@@ -391,6 +395,59 @@ TEST_P(ReportsTest, NumberOfADeletedSegmentMayBeTakenByAnother) {
   EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("a", {"s", 1}).status()));
   EXPECT_TRUE(HasData("a", 2));
   ExpectSame("a", true);
+}
+
+TEST_P(ReportsTest, DelayedReportDoesNotReplaceNewerRecords) {
+  CreateDeviceRig("a");
+  // Number 1, and a later one.
+  for (const std::int64_t number : {1, 2}) {
+    if (number == 1) ReportNewRigs(ReportedData::kNone);
+    SetLabelOnDevice("a", "north");
+    const Report delayed = NextReport();
+    ASSERT_EQ(delayed.number, number);
+    SetLabelOnDevice("a", "south");
+    const Report newer = NextReport();
+    ASSERT_EQ(newer.number, number);
+    ASSERT_TRUE(Give(newer).ok());
+    EXPECT_TRUE(Give(delayed).ok());
+    EXPECT_EQ(store_->GetRig("a")->labels.at("site"), "south");
+    ASSERT_TRUE(device_->outbox()->Confirm(newer, 1).ok());
+    ExpectSame("a");
+    ReportAll();
+  }
+  EXPECT_EQ(anew_, 0);
+}
+
+TEST_P(ReportsTest, DeviceThatWasRestoredFollowsItsLaterAttempts) {
+  CreateDeviceRig("a");
+  for (const char* label : {"x", "y", "z"}) {
+    SetLabelOnDevice("a", label);
+    ReportAll();
+  }
+  // It counts its attempts from 1 again.
+  ASSERT_TRUE(device_->outbox()->Close().ok());
+  SetLabelOnDevice("a", "north");
+  ReportAll();
+  EXPECT_EQ(store_->GetRig("a")->labels.at("site"), "north");
+  SetLabelOnDevice("a", "south");
+  ReportAll();
+  EXPECT_EQ(store_->GetRig("a")->labels.at("site"), "south");
+  EXPECT_EQ(anew_, 0);
+}
+
+TEST_P(ReportsTest, DeviceThatDoesNotCountItsAttemptsIsTaken) {
+  CreateDeviceRig("a");
+  ReportAll();
+  for (const char* label : {"north", "south"}) {
+    SetLabelOnDevice("a", label);
+    Report report = NextReport();
+    report.attempt = 0;
+    const auto answer = Give(report);
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    EXPECT_FALSE(answer->begin_anew);
+    ASSERT_TRUE(device_->outbox()->Confirm(report, 1).ok());
+    EXPECT_EQ(store_->GetRig("a")->labels.at("site"), label);
+  }
 }
 
 TEST_P(ReportsTest, EventsOfADeviceFollowThoseOfAnEarlierOneOfItsName) {

@@ -323,6 +323,22 @@ TEST_F(ReporterTest, AnInstructionMustBeAboutItsRig) {
   EXPECT_TRUE(absl::IsFailedPrecondition(CallHub(request, &given)));
 }
 
+TEST_F(ReporterTest, ADeviceThatWasRestoredFollowsItsLaterAttempts) {
+  CreateDeviceRig();
+  Begin();
+  for (int k = 0; k < 3; ++k) {
+    Put(k);
+    Report();
+  }
+  // It counts its attempts from 1 again.
+  ASSERT_TRUE(device_.store->outbox()->Close().ok());
+  Put(3);
+  EXPECT_GT(Report().waiting, 0);
+  EXPECT_EQ(Report().refusal, "");
+  EXPECT_EQ(SegmentsAtHub(), 4u);
+  EXPECT_EQ(device_.store->outbox()->List()->front().waiting, 0);
+}
+
 TEST_F(ReporterTest, ACallerOfALabelSeesNoEventsOfAnEarlierRig) {
   const auto create = [&](const std::string& site) {
     StoredRig rig{TestRig("a"), 0};
