@@ -23,13 +23,21 @@ constexpr int kData = static_cast<int>(RecordKind::kData);
 constexpr int kMaxEntries = 500;
 
 absl::Status Put(UnitOfWork* tx, RecordKind kind, std::int64_t number) {
+  // A place is not given again when its note is gone: the confirmation of a
+  // report that is under way would remove the new note.
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t place,
+      InsertReturning(tx->db(),
+                      "UPDATE uplinks SET place = place + 1 WHERE rig = ?1 "
+                      "RETURNING place",
+                      tx->rig_row()));
   return Statement(tx->db(),
                    "INSERT INTO outbox (rig, place, kind, number, revision) "
-                   "VALUES (?1, (SELECT coalesce(max(place), 0) + 1 "
-                   "  FROM outbox WHERE rig = ?1), ?2, ?3, 1) "
+                   "VALUES (?1, ?2, ?3, ?4, 1) "
                    "ON CONFLICT (rig, kind, number) "
                    "DO UPDATE SET revision = outbox.revision + 1",
                    tx->rig_row(),
+                   place,
                    static_cast<int>(kind),
                    number)
       .Run();

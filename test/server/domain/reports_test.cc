@@ -450,6 +450,19 @@ TEST_P(ReportsTest, DeviceThatDoesNotCountItsAttemptsIsTaken) {
   }
 }
 
+TEST_P(ReportsTest, DeletionDuringAReportIsToldWithItsEvent) {
+  const Rig rig = CreateDeviceRig("a");
+  ReportAll();
+  PutOnDevice(rig, 0);
+  const Report report = NextReport();
+  ASSERT_TRUE(Give(report).ok());
+  ASSERT_TRUE(device_domain_->DeleteRig("a", "eve", "sold").ok());
+  ASSERT_TRUE(device_->outbox()->Confirm(report, 1).ok());
+  ReportAll();
+  EXPECT_TRUE(absl::IsNotFound(store_->GetRig("a").status()));
+  EXPECT_EQ(EventsOf(store_.get(), "a"), EventsOf(device_.get(), "a"));
+}
+
 TEST_P(ReportsTest, EventsOfADeviceFollowThoseOfAnEarlierOneOfItsName) {
   const Rig rig = CreateDeviceRig("a");
   PutOnDevice(rig, 0);
