@@ -121,6 +121,23 @@ absl::Status ApplyRig(UnitOfWork* tx, const Rows& rows) {
                                violations.front().message));
 }
 
+// Deletes the segment that has this key and another number: the device has
+// deleted it, and got the segment again.
+absl::Status DeleteOther(UnitOfWork* tx,
+                         const SegmentKey& key,
+                         std::int64_t number) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t other,
+      ReadInt(tx->db(),
+              "SELECT coalesce(max(sequence), 0) FROM segments WHERE rig = ?1 "
+              "AND session = ?2 AND session_index = ?3 AND sequence <> ?4",
+              tx->rig_row(),
+              key.session,
+              key.index,
+              number));
+  return other == 0 ? absl::OkStatus() : DeleteSegment(tx, other);
+}
+
 absl::Status ApplySegment(UnitOfWork* tx,
                           const Record& record,
                           const Rows& rows) {
@@ -138,6 +155,7 @@ absl::Status ApplySegment(UnitOfWork* tx,
   SELFCAL_RETURN_IF_ERROR(before.status());
   // The last segment was deleted, and another one took its number.
   if (another) SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, record.number()));
+  SELFCAL_RETURN_IF_ERROR(DeleteOther(tx, key, record.number()));
   SELFCAL_RETURN_IF_ERROR(ReplaceRows(tx, record, rows));
   SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
                                     "UPDATE rigs SET last_seen_ns = ?2 "

@@ -397,6 +397,25 @@ TEST_P(ReportsTest, NumberOfADeletedSegmentMayBeTakenByAnother) {
   ExpectSame("a", true);
 }
 
+TEST_P(ReportsTest, NewestSegmentsMayComeAgainInAnotherOrder) {
+  for (const bool anew : {false, true}) {
+    const std::string id = anew ? "a" : "b";
+    const Rig rig = CreateDeviceRig(id);
+    for (int k = 0; k < 4; ++k) PutOnDevice(rig, k);
+    ReportAll();
+    if (anew) {
+      ASSERT_TRUE(device_->outbox()->Close().ok());
+    }
+    for (const int k : {3, 2}) {
+      ASSERT_TRUE(
+          device_domain_->DeleteSegment(id, {"s", k}, "eve", "private").ok());
+    }
+    for (const int k : {3, 2}) PutOnDevice(rig, k);
+    ReportAll();
+    ExpectSame(id);
+  }
+}
+
 TEST_P(ReportsTest, DelayedReportDoesNotReplaceNewerRecords) {
   CreateDeviceRig("a");
   // Number 1, and a later one.
