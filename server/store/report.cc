@@ -9,6 +9,7 @@
 
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
+#include "proto/label_text.h"
 #include "selfcal/store/report.pb.h"
 #include "server/status/status_macros.h"
 #include "server/store/announcements.h"
@@ -90,6 +91,17 @@ absl::Status ReplaceRows(UnitOfWork* tx,
   return absl::OkStatus();
 }
 
+// Against the rules in rig.proto.
+absl::Status CheckLabels(const StoredRig& rig) {
+  for (const auto& [name, value] : rig.labels) {
+    if (!IsLabelName(name)) return BadReport("a label has no name of a label");
+    if (!IsLabelValue(value)) {
+      return BadReport(fmt::format("the label {} has no value of one", name));
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status ApplyRig(UnitOfWork* tx, const Rows& rows) {
   const ReportedRow* row = RowOf(rows, "rigs");
   if (row == nullptr) return BadReport("a rig has no definition");
@@ -102,23 +114,19 @@ absl::Status ApplyRig(UnitOfWork* tx, const Rows& rows) {
                                     BlobView{row->Of("definition").blob()},
                                     BlobView{row->Of("sha256").blob()})
                               .Run());
-  SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
-                                    "DELETE FROM rig_labels WHERE rig = ?1",
-                                    tx->rig_row())
-                              .Run());
-  for (const ReportedRow& label : rows) {
-    if (&label == row) continue;
-    SELFCAL_RETURN_IF_ERROR(WriteRow(tx, label, 0, OnConflict::kUpdate));
-  }
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig stored, ReadRig(tx));
   if (stored.rig.id != tx->rig()) {
     return BadReport(fmt::format("it defines the rig {}", stored.rig.id));
   }
   const std::vector<Violation> violations = Validate(stored.rig);
-  if (violations.empty()) return absl::OkStatus();
-  return BadReport(fmt::format("{} of the rig {}",
-                               violations.front().field,
-                               violations.front().message));
+  if (!violations.empty()) {
+    return BadReport(fmt::format("{} of the rig {}",
+                                 violations.front().field,
+                                 violations.front().message));
+  }
+  SELFCAL_RETURN_IF_ERROR(CheckLabels(stored));
+  // Grants depend on labels: those of the definition, whatever the rows say.
+  return WriteLabels(tx, stored);
 }
 
 // Deletes the segment that has this key and another number: the device has

@@ -110,6 +110,10 @@ absl::Status WriteRig(UnitOfWork* tx, const StoredRig& rig) {
                 BlobView{bytes},
                 BlobView{sha256})
           .Run());
+  return WriteLabels(tx, rig);
+}
+
+absl::Status WriteLabels(UnitOfWork* tx, const StoredRig& rig) {
   SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
                                     "DELETE FROM rig_labels WHERE rig = ?1",
                                     tx->rig_row())

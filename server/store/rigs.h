@@ -18,6 +18,8 @@ namespace selfcal::server {
 absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig);
 // Replaces the definition and the labels of the rig.
 absl::Status WriteRig(UnitOfWork* tx, const StoredRig& rig);
+// Replaces the rows of its labels, by which rigs are searched.
+absl::Status WriteLabels(UnitOfWork* tx, const StoredRig& rig);
 // Deletes everything that is stored of the rig, except its events.
 absl::Status DeleteRigRows(UnitOfWork* tx);
 

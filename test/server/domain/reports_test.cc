@@ -531,6 +531,24 @@ TEST_P(ReportsTest, EventsOfAnEarlierRigAreNotReportedAsThoseOfALaterOne) {
   EXPECT_THAT(EventsOf(store_.get(), "a"), SizeIs(2));
 }
 
+TEST_P(ReportsTest, LabelsAreThoseOfTheDefinition) {
+  CreateDeviceRig("a");
+  SetLabelOnDevice("a", "north");
+  ReportNewRigs(ReportedData::kNone);
+  Report report = NextReport();
+  store::ReportedRecords records;
+  ASSERT_TRUE(records.ParseFromString(report.records));
+  ASSERT_EQ(records.records(0).rows_size(), 2);
+  records.mutable_records(0)->mutable_rows(1)->mutable_values(1)->set_text(
+      "south");
+  report.records = records.SerializeAsString();
+  ASSERT_TRUE(Give(report).ok());
+  EXPECT_THAT(store_->ListRigs({.labels = {{"site", "south"}}}, {})->items,
+              IsEmpty());
+  EXPECT_THAT(store_->ListRigs({.labels = {{"site", "north"}}}, {})->items,
+              SizeIs(1));
+}
+
 TEST_P(ReportsTest, DeletedRigIsDeletedAtTheHubAndItsEventsRemain) {
   const Rig rig = CreateDeviceRig("a");
   PutOnDevice(rig, 0);
@@ -716,7 +734,13 @@ TEST_P(ReportsTest, WhatIsNoReportIsRefusedAndChangesNothing) {
   invalid = rig;
   invalid.table_size = -1;
   bad.push_back(WithDefinition(good, {invalid, 0}));
-  EXPECT_GT(bad.size(), 14u);
+  for (const auto& [name, value] :
+       {std::pair("Site", "north"), std::pair("site", "no\nrth")}) {
+    StoredRig labelled{rig, 0};
+    labelled.labels[name] = value;
+    bad.push_back(WithDefinition(good, labelled));
+  }
+  EXPECT_GT(bad.size(), 16u);
   for (std::size_t k = 0; k < bad.size(); ++k) {
     const absl::Status status = give(bad[k]);
     EXPECT_TRUE(absl::IsInvalidArgument(status)) << k << ": " << status;
