@@ -25,6 +25,8 @@ struct Phases {
   WorkingPoint* point;
   Descent* descent;
   NoiseWeighting* noise;
+  // True once it is known which information stems from noise.
+  bool* noise_tested;
 };
 
 // Lets weakly observed directions move that are linear within their sigma. The
@@ -41,10 +43,11 @@ bool ReleaseWeak(const Phases& phases) {
 // none is left.
 bool HoldSpurious(const Phases& phases) {
   while (phases.descent->converged()) {
-    auto remaining = HoldSpuriousDirections(
+    SpuriousTest test = HoldSpuriousDirections(
         phases.segments, phases.partitioning, phases.point);
-    if (!remaining) break;
-    if (!phases.descent->DescendHolding(*std::move(remaining)) ||
+    *phases.noise_tested = test.made;
+    if (!test.remaining) break;
+    if (!phases.descent->DescendHolding(*std::move(test.remaining)) ||
         !phases.noise->Reweight()) {
       return false;
     }
@@ -161,8 +164,9 @@ CalibrationRun RunCalibration(const Rig& rig,
   result.reprojection_rms_before_px = before.rms_px;
   result.reprojection_median_before_px = before.median_px;
 
-  const bool estimated =
-      Estimate({segments, partitioning, &point, &descent, &noise});
+  bool noise_tested = false;
+  const bool estimated = Estimate(
+      {segments, partitioning, &point, &descent, &noise, &noise_tested});
   const DescentState& state = descent.state();
   result.status = state.status;
   result.iterations = state.iterations;
@@ -175,6 +179,12 @@ CalibrationRun RunCalibration(const Rig& rig,
   }
   result.noise_scales = noise.ScalesOfStated();
   result.message = MessageOf(state);
+  if (descent.converged() && !noise_tested) {
+    result.status = CalibrateStatus::kStalled;
+    result.message =
+        "with noise added once more no minimum is reached, so that it is "
+        "unknown which information stems from noise";
+  }
   ReportEstimate(point, &run);
   TestSegments(segments, point, &run);
   ReportUse(point, &result);

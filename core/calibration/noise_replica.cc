@@ -4,12 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "core/calibration/linear_range.h"
 #include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
+
+constexpr int kReplicas = 3;
+constexpr std::uint64_t kReplicaSeed = 1;
+// If one replica gives less than this, no further replicas are needed.
+constexpr double kMaybeSpurious = 0.15;
 
 class NoiseSource {
  public:
@@ -82,6 +88,25 @@ Eigen::MatrixXd FindSpurious(const Rig& rig,
     spurious.rightCols<1>() = subspace.estimated * u;
   }
   return spurious;
+}
+
+std::optional<Eigen::MatrixXd> FindSpuriousByReplicas(
+    const Rig& rig,
+    const ThetaSubspace& subspace,
+    const Eigen::MatrixXd& Lambda,
+    const NoiseReplica& replica) {
+  std::vector<Eigen::MatrixXd> under_noise;
+  for (int i = 0; i < kReplicas; ++i) {
+    auto information = replica(kReplicaSeed + i);
+    if (!information) continue;
+    under_noise.push_back(*std::move(information));
+    if (FindSpurious(rig, subspace, Lambda, under_noise, kMaybeSpurious)
+            .cols() == 0) {
+      break;
+    }
+  }
+  if (under_noise.empty()) return std::nullopt;
+  return FindSpurious(rig, subspace, Lambda, under_noise, kSpurious);
 }
 
 std::optional<Eigen::MatrixXd> InformationUnderNoise(

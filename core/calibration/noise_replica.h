@@ -19,6 +19,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -50,8 +51,6 @@ std::optional<Eigen::MatrixXd> InformationUnderNoise(
 // information has been seen to grow by up to 0.09 in one replica, spurious
 // information by 0.28 to 0.95.)
 inline constexpr double kSpurious = 0.3;
-// If one replica gives less than this, no further replicas are needed.
-inline constexpr double kMaybeSpurious = 0.15;
 
 // Returns those of the estimated directions (D x n, orthonormal, in units of
 // the prior) whose information, with all others unknown, is spurious. `Lambda`
@@ -62,5 +61,17 @@ Eigen::MatrixXd FindSpurious(const Rig& rig,
                              const Eigen::MatrixXd& Lambda,
                              const std::vector<Eigen::MatrixXd>& under_noise,
                              double largest_growth);
+
+// Result of InformationUnderNoise with the noise of a seed.
+using NoiseReplica =
+    std::function<std::optional<Eigen::MatrixXd>(std::uint64_t seed)>;
+
+// Returns the spurious directions according to a few replicas, or to one if it
+// shows none that might be; nullopt if the states reach no minimum in any.
+std::optional<Eigen::MatrixXd> FindSpuriousByReplicas(
+    const Rig& rig,
+    const ThetaSubspace& subspace,
+    const Eigen::MatrixXd& Lambda,
+    const NoiseReplica& replica);
 
 }  // namespace selfcal

@@ -9,10 +9,6 @@
 namespace selfcal {
 namespace {
 
-// Replicas with added noise, by which spurious information is detected.
-constexpr int kReplicas = 3;
-constexpr std::uint64_t kReplicaSeed = 1;
-
 Eigen::MatrixXd NoDirections(const WorkingPoint& point) {
   return Eigen::MatrixXd(point.estimate().d.size(), 0);
 }
@@ -28,38 +24,32 @@ std::optional<ThetaSubspace> ReleaseWeakDirections(const WorkingPoint& point) {
   return TrustedSubspace(point.rig(), range, kWeakInformation);
 }
 
-std::optional<ThetaSubspace> HoldSpuriousDirections(
+SpuriousTest HoldSpuriousDirections(
     const std::vector<const MotionSegment*>& segments,
     const Partitioning& partitioning,
     WorkingPoint* point) {
   const ThetaSubspace& subspace = point->subspace();
-  if (subspace.estimated.cols() == 0) return std::nullopt;
+  if (subspace.estimated.cols() == 0) return {};
   const Eigen::MatrixXd nothing = NoDirections(*point);
   const SolverRound round = point->RoundOfNoise(nothing);
   point->linearised().system.ReleaseMemory();  // each replica has its own
   const Eigen::MatrixXd& Lambda = point->information().Lambda;
-  std::vector<Eigen::MatrixXd> under_noise;
-  Eigen::MatrixXd spurious = nothing;
-  // The first replica usually shows that nothing is spurious.
-  for (int i = 0; i < kReplicas && (i == 0 || spurious.cols() > 0); ++i) {
-    const auto information = InformationUnderNoise(round,
-                                                   segments,
-                                                   partitioning,
-                                                   point->estimate(),
-                                                   point->screening().landmarks,
-                                                   point->track_noise_factor(),
-                                                   kReplicaSeed + i);
-    if (information) under_noise.push_back(*information);
-    spurious = FindSpurious(point->rig(),
-                            subspace,
-                            Lambda,
-                            under_noise,
-                            i + 1 < kReplicas ? kMaybeSpurious : kSpurious);
-  }
-  if (spurious.cols() == 0) return std::nullopt;
-  Eigen::MatrixXd held(spurious.rows(), subspace.held.cols() + spurious.cols());
-  held << subspace.held, spurious;
-  return HoldDirections(point->rig(), Lambda, held);
+  const auto spurious = FindSpuriousByReplicas(
+      point->rig(), subspace, Lambda, [&](std::uint64_t seed) {
+        return InformationUnderNoise(round,
+                                     segments,
+                                     partitioning,
+                                     point->estimate(),
+                                     point->screening().landmarks,
+                                     point->track_noise_factor(),
+                                     seed);
+      });
+  if (!spurious) return {.made = false};
+  if (spurious->cols() == 0) return {};
+  Eigen::MatrixXd held(spurious->rows(),
+                       subspace.held.cols() + spurious->cols());
+  held << subspace.held, *spurious;
+  return {.remaining = HoldDirections(point->rig(), Lambda, held)};
 }
 
 }  // namespace selfcal

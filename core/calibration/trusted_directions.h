@@ -17,10 +17,18 @@ namespace selfcal {
 // (linear_range.h). Nothing if none is held, or if that cannot be tested.
 std::optional<ThetaSubspace> ReleaseWeakDirections(const WorkingPoint& point);
 
-// The subspace that also holds the directions whose information stems from
-// noise in the states (noise_replica.h). Nothing if there is none. `segments`
-// and `partitioning` are those of the problem.
-std::optional<ThetaSubspace> HoldSpuriousDirections(
+struct SpuriousTest {
+  // False if no replica with added noise reaches a minimum: nothing can be said
+  // about the estimated directions.
+  bool made = true;
+  // The subspace that also holds the spurious directions; nullopt if there is
+  // none.
+  std::optional<ThetaSubspace> remaining = std::nullopt;
+};
+
+// Finds the directions whose information stems from noise in the states
+// (noise_replica.h). `segments` and `partitioning` are those of the problem.
+SpuriousTest HoldSpuriousDirections(
     const std::vector<const MotionSegment*>& segments,
     const Partitioning& partitioning,
     WorkingPoint* point);

@@ -70,6 +70,53 @@ TEST(FindSpurious, NamesDirectionsOfWhichInformationDoubles) {
                    kSpurious);
   ASSERT_EQ(spurious.cols(), 1);
   EXPECT_NEAR(std::abs(spurious.col(0).dot(u)), 1, 1e-9);
+
+  // The first replica settles nowhere, the second is no clear case, and the
+  // third shows what the information is.
+  int replicas = 0;
+  const auto third = [&](std::uint64_t) -> std::optional<Eigen::MatrixXd> {
+    ++replicas;
+    if (replicas == 1) return std::nullopt;
+    return lambda(replicas == 2 ? 880 : 1500, 1000);
+  };
+  const auto found = FindSpuriousByReplicas(rig, subspace, claimed, third);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(replicas, 3);
+  EXPECT_EQ(found->cols(), 1);
+}
+
+TEST(FindSpurious, EndsWithTheFirstReplicaThatShowsNothing) {
+  const Rig rig = HandheldRig("r");
+  const Eigen::VectorXd in_sigmas = PriorSigmas(rig).cwiseInverse();
+  const Eigen::MatrixXd Lambda = 100 * in_sigmas.cwiseAbs2().asDiagonal();
+  int replicas = 0;
+  const auto found = FindSpuriousByReplicas(
+      rig,
+      WholeSubspace(rig),
+      Lambda,
+      [&](std::uint64_t) -> std::optional<Eigen::MatrixXd> {
+        if (++replicas == 1) return std::nullopt;
+        return Lambda;
+      });
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->cols(), 0);
+  EXPECT_EQ(replicas, 2);
+}
+
+TEST(FindSpurious, SaysNothingIfNoReplicaSettles) {
+  const Rig rig = HandheldRig("r");
+  const Eigen::VectorXd in_sigmas = PriorSigmas(rig).cwiseInverse();
+  const Eigen::MatrixXd Lambda = 100 * in_sigmas.cwiseAbs2().asDiagonal();
+  int replicas = 0;
+  EXPECT_FALSE(FindSpuriousByReplicas(
+      rig,
+      WholeSubspace(rig),
+      Lambda,
+      [&](std::uint64_t) -> std::optional<Eigen::MatrixXd> {
+        ++replicas;
+        return std::nullopt;
+      }));
+  EXPECT_EQ(replicas, 3);
 }
 
 // The scale of the scene, and with it the lever arm of the camera, is
