@@ -290,18 +290,13 @@ void AddRigConditions(const RigQuery& query,
                       const std::string& rigs,
                       SqlCondition* condition,
                       const std::string& from) {
-  const auto has_label = [&](const auto& label) {
+  const auto with_label = [&](const auto& label) {
     const std::string name = condition->Parameter(label.first);
     return fmt::format(
-        "{}.rig IN (SELECT l.rig FROM rig_labels l "
-        "  WHERE l.name = {} AND l.value = {}{})",
-        rigs,
+        "SELECT l.rig FROM rig_labels l WHERE l.name = {} AND l.value = {}{}",
         name,
         condition->Parameter(label.second),
         from.empty() ? "" : " AND l.rig >= " + from);
-  };
-  const auto has_name = [&](const std::string& name) {
-    return fmt::format("{}.id = {}", rigs, condition->Parameter(name));
   };
   if (!query.text.empty()) {
     SqlCondition names = condition->Next();
@@ -311,18 +306,30 @@ void AddRigConditions(const RigQuery& query,
         names,
         ")");
   }
-  if (!query.name.empty()) condition->And(has_name(query.name));
-  for (const auto& label : query.labels) condition->And(has_label(label));
+  const auto is_one_of = [&](const std::string& keys) {
+    condition->And(fmt::format("{}.rig IN ({})", rigs, keys));
+  };
+  if (!query.name.empty()) {
+    condition->And(rigs + ".id = " + condition->Parameter(query.name));
+  }
+  for (const auto& label : query.labels) is_one_of(with_label(label));
   if (query.with_alarms) condition->And(rigs + ".alarms > 0");
   if (query.choice) {
-    std::vector<std::string> any = {"FALSE"};
+    // One set of keys: with alternatives on the row itself, planners would read
+    // all rigs to find those few.
+    std::vector<std::string> chosen;
     for (const std::string& name : query.choice->names) {
-      any.push_back(has_name(name));
+      chosen.push_back("SELECT c.rig FROM rigs c WHERE c.id = " +
+                       condition->Parameter(name));
     }
     for (const auto& label : query.choice->labels) {
-      any.push_back(has_label(label));
+      chosen.push_back(with_label(label));
     }
-    condition->And(fmt::format("({})", fmt::join(any, " OR ")));
+    if (chosen.empty()) {
+      condition->And("FALSE");
+    } else {
+      is_one_of(fmt::format("{}", fmt::join(chosen, " UNION ALL ")));
+    }
   }
 }
 
