@@ -58,18 +58,25 @@ class Fusion {
   CompletedEstimate Run(const std::vector<RememberedSegment>& remembered) {
     Join(remembered);
     if (basis_.cols() == 0) return std::move(result_);
-    const auto joined = Count();
+    std::vector<JoinedSegment> compared = Near();
+    ExcludeContradictions();
     RememberedUse& use = result_.use;
-    if (joined > 0) use.contradicting = ExcludeContradictions();
-    if (2 * use.contradicting > joined) {
+    if (2 * use.contradicting > use.compared) {
+      // They may be of the device before or after a change.
       use.unused = "most of them contradict the segments whose data is kept";
-      return std::move(result_);
+    } else {
+      compared = Near();
     }
-    const SplitFindings found = FindSplit(
-        rig_, theta_, at_.subspace.estimated, at_.excess, Near(), options_);
+    const SplitFindings found = Compare(compared);
     if (found.split.probability < kRareSplit) use.split = found.split;
-    if (joined > 0) Add();
-    if (found.doubt) AddDoubt(*found.doubt);
+    if (use.unused.empty() && Count() > 0) Add();
+    // The doubt is about an estimate from these segments.
+    const std::vector<JoinedSegment> based_on =
+        use.segments > 0 ? compared : CalibratedOn();
+    const auto doubt = based_on.size() == compared.size()
+                           ? found.doubt
+                           : Compare(based_on).doubt;
+    if (doubt) AddDoubt(*doubt);
     return std::move(result_);
   }
 
@@ -93,6 +100,20 @@ class Fusion {
     return std::count_if(joined_.begin(), joined_.end(), [](const auto& one) {
       return !one.calibrated_on;
     });
+  }
+
+  SplitFindings Compare(const std::vector<JoinedSegment>& segments) const {
+    return FindSplit(
+        rig_, theta_, at_.subspace.estimated, at_.excess, segments, options_);
+  }
+
+  std::vector<JoinedSegment> CalibratedOn() const {
+    std::vector<JoinedSegment> own;
+    std::copy_if(joined_.begin(),
+                 joined_.end(),
+                 std::back_inserter(own),
+                 [](const JoinedSegment& one) { return one.calibrated_on; });
+    return own;
   }
 
   // Segments whose linearisation point is near enough for a comparison.
@@ -129,16 +150,18 @@ class Fusion {
   }
 
   // Tests each of them separately.
-  int ExcludeContradictions() {
+  void ExcludeContradictions() {
     const double limit = kWrongExclusion / static_cast<double>(Count());
-    return static_cast<int>(
-        std::erase_if(joined_, [&](const JoinedSegment& one) {
-          if (one.calibrated_on) return false;
-          const RememberedInformation alone =
-              InformationOfRemembered(rig_, theta_, {&one, 1}, options_);
-          return alone.segments > 0 &&
-                 TestWithData(ReducedOf(alone.information)).probability < limit;
-        }));
+    RememberedUse& use = result_.use;
+    const auto excluded = std::erase_if(joined_, [&](const JoinedSegment& one) {
+      if (one.calibrated_on) return false;
+      const RememberedInformation alone =
+          InformationOfRemembered(rig_, theta_, {&one, 1}, options_);
+      if (alone.segments == 0) return false;
+      ++use.compared;
+      return TestWithData(ReducedOf(alone.information)).probability < limit;
+    });
+    use.contradicting = static_cast<int>(excluded);
   }
 
   void Add() {

@@ -51,6 +51,9 @@ struct RememberedUse {
   // others are used, those that were linearised too far from the result.
   int too_far = 0;
   int contradicting = 0;
+  // Segments that were tested against those with data, contradicting ones
+  // included.
+  int compared = 0;
   // Largest distance from the linearisation point of a used one to the result,
   // rms over the free components in reference sigmas.
   double reach = 0;

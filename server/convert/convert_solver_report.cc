@@ -145,6 +145,7 @@ void Put(const std::string& rig,
   message->set_segments(use.segments);
   message->set_too_far(use.too_far);
   message->set_contradicting(use.contradicting);
+  message->set_compared(use.compared);
   message->set_reach(use.reach);
   Put(use.agreement, message->mutable_agreement());
   message->set_unused(use.unused);
@@ -158,6 +159,7 @@ RememberedUse Get(const v1::EvictedUse& message) {
   use.segments = message.segments();
   use.too_far = message.too_far();
   use.contradicting = message.contradicting();
+  use.compared = message.compared();
   use.reach = message.reach();
   use.agreement = Get(message.agreement());
   use.unused = message.unused();

@@ -86,6 +86,7 @@ TEST_F(RememberedFusionTest, AFewSegmentsWithRememberedOnesEqualAll) {
   EXPECT_EQ(informed.remembered.segments, 5);
   EXPECT_EQ(informed.remembered.too_far, 0);
   EXPECT_EQ(informed.remembered.contradicting, 0);
+  EXPECT_EQ(informed.remembered.compared, 5);
   EXPECT_EQ(informed.remembered.reach, 0);
   EXPECT_GT(informed.remembered.agreement.degrees, 10);
   EXPECT_GT(informed.remembered.agreement.probability, 1e-3);
@@ -169,9 +170,47 @@ TEST_F(RememberedFusionTest, UsesNoneIfMostContradictTheData) {
   }
   const CalibrationResult result = CalibrateOn(kept_, remembered);
   EXPECT_EQ(result.remembered.segments, 0);
+  EXPECT_EQ(result.remembered.compared, 5);
+  EXPECT_EQ(result.remembered.contradicting, 5);
   EXPECT_NE(result.remembered.unused, "");
   EXPECT_TRUE(Moved(alone.theta, result.theta).isZero());
   EXPECT_EQ(result.covariance, alone.covariance);
+}
+
+// The camera was turned. The data is of the device after that, and all that is
+// remembered of the device before.
+TEST_F(RememberedFusionTest, FindsAChangeBetweenMemoryAndData) {
+  const CalibrationResult before = CalibrateOn(all_, {});
+  std::vector<RememberedSegment> remembered = RememberedAt(before.theta);
+  for (const std::int64_t i : kept_) {
+    remembered[i].ends = SummariseEnds(rig_, before.theta, segments_[i]);
+  }
+  const Calibration first = truth_;
+  Eigen::VectorXd turn = Eigen::VectorXd::Zero(TangentSize(truth_));
+  const int i =
+      MatchComponents(TangentComponents(truth_), {"cam0.q_CI.x"}).at(0);
+  // All of them together contradict the data; most of them do.
+  for (const double angle : {4e-3, 8e-3}) {
+    turn(i) = angle;
+    truth_ = BoxPlus(first, turn);
+    segments_ = Session(*MakeHandheld(16.5, 1, 6), "later");
+    std::vector<RememberedSegment> both = remembered;
+    for (const MotionSegment& segment : segments_) {
+      both.push_back({.key = segment.key});
+    }
+    const CalibrationResult after = CalibrateOn(all_, both);
+    const RememberedUse& use = after.remembered;
+    EXPECT_EQ(use.segments, 0) << angle;
+    EXPECT_EQ(use.compared, 8) << angle;
+    EXPECT_EQ(2 * use.contradicting > use.compared, angle > 6e-3) << angle;
+    ASSERT_TRUE(use.split) << angle;
+    EXPECT_LT(use.split->without_one, 1e-4) << angle;
+    EXPECT_EQ(use.split->first, (SegmentKey{"later", 0})) << angle;
+    // It is calibrated on none of the device before.
+    EXPECT_LT(LargestInSigmas(BoxMinus(after.theta, truth_), after.covariance),
+              3.5)
+        << angle;
+  }
 }
 
 TEST_F(RememberedFusionTest, IgnoresSegmentsLinearisedTooFarAway) {

@@ -117,7 +117,7 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   result.noise_scales = {{NoiseKind::kGyro, 3, 0.05, 100, 2.9, false}};
   result.segment_fits = {{{"s", 7}, 1.5, 893, {40, 25, 0.03}, "a spike"}};
   result.halves = {30, 26, 0.25};
-  result.remembered = {9, 1, 2, 0.75, {20, 24, 0.7}, "not at all"};
+  result.remembered = {9, 1, 2, 11, 0.75, {20, 24, 0.7}, "not at all"};
   result.remembered.change_probability = 0.125;
   result.remembered.change_sigmas = Eigen::VectorXd::LinSpaced(size, 0, 1);
   const auto decoded = DecodeResult(EncodeResult(result));
@@ -135,6 +135,7 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   EXPECT_EQ(decoded->remembered.segments, 9);
   EXPECT_EQ(decoded->remembered.too_far, 1);
   EXPECT_EQ(decoded->remembered.contradicting, 2);
+  EXPECT_EQ(decoded->remembered.compared, 11);
   EXPECT_EQ(decoded->remembered.reach, 0.75);
   EXPECT_EQ(decoded->remembered.agreement.degrees, 24);
   EXPECT_EQ(decoded->remembered.unused, "not at all");
