@@ -171,7 +171,7 @@ absl::Status ReportDisagreement(UnitOfWork* tx,
                                 std::int64_t version,
                                 const std::string& finding) {
   SELFCAL_RETURN_IF_ERROR(ReadCalibration(tx, version).status());
-  SELFCAL_RETURN_IF_ERROR(InsertDisagreement(tx, version, finding));
+  SELFCAL_RETURN_IF_ERROR(InsertFinding(tx, version, finding));
   return AppendEvent(tx,
                      EventKind::kCoresDisagree,
                      fmt::format("version {}: {}", version, finding));

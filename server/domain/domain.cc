@@ -426,9 +426,10 @@ absl::StatusOr<StoredCalibration> Domain::StoreCandidate(
 absl::StatusOr<StoredCalibration> Domain::FinishRun(
     const RigClaim& claim,
     std::int64_t run,
-    const StoredCalibration& calibration) {
+    const StoredCalibration& calibration,
+    const std::string& finding) {
   return ChangeOwnRig(store_, claim, clock_(), [&](UnitOfWork* tx) {
-    return server::FinishRun(tx, run, calibration, options_.change);
+    return server::FinishRun(tx, run, calibration, finding, options_.change);
   });
 }
 

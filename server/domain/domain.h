@@ -223,12 +223,17 @@ class Domain {
   // that is a device change, as in CommitScore, and none of them is
   // quarantined.
   //
+  // `finding` is what its validation found about the version that stays active
+  // (StoredCalibration::finding); empty: nothing. It is recorded with that
+  // version, and is one more reason of the one that is rejected.
+  //
   // Deletes data that only the run referenced. May create the next run, as
   // CommitScore does.
   absl::StatusOr<StoredCalibration> FinishRun(
       const RigClaim& claim,
       std::int64_t run,
-      const StoredCalibration& calibration);
+      const StoredCalibration& calibration,
+      const std::string& finding = "");
   // Ends a run without a calibration: kFailed or kCancelled. Its candidate, if
   // it has one, is rejected with the message.
   absl::StatusOr<StoredRun> EndRun(const RigClaim& claim,

@@ -87,6 +87,7 @@ bool ChangeExplains(const StoredCalibration& validated) {
                                                     "sigma_growth",
                                                     "halves",
                                                     "disagreement",
+                                                    "remembered",
                                                     "held_out_probability",
                                                     "confirmed"};
   if (!validated.validation) return true;
@@ -97,6 +98,16 @@ bool ChangeExplains(const StoredCalibration& validated) {
                      std::end(kExplained),
                      check.name) != std::end(kExplained);
   });
+}
+
+// A finding about the version that stays active.
+absl::Status RecordFinding(UnitOfWork* tx,
+                           const std::string& finding,
+                           StoredCalibration* rejected) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active, ActiveVersion(tx));
+  rejected->reasons.push_back(
+      fmt::format("Version {}, which stays active: {}", active, finding));
+  return InsertFinding(tx, active, finding);
 }
 
 // Rejects a result that is outdated by what happened since the run was created.
@@ -139,6 +150,7 @@ absl::StatusOr<StoredCalibration> FinishRun(
     UnitOfWork* tx,
     std::int64_t run_number,
     const StoredCalibration& calibration,
+    const std::string& finding,
     const ChangeOptions& options) {
   if (calibration.state != CalibrationState::kActive &&
       calibration.state != CalibrationState::kRejected) {
@@ -154,6 +166,9 @@ absl::StatusOr<StoredCalibration> FinishRun(
   validated.reasons = calibration.reasons;
   validated.validation = calibration.validation;
   validated.verdict = calibration.verdict;
+  if (!finding.empty()) {
+    SELFCAL_RETURN_IF_ERROR(RecordFinding(tx, finding, &validated));
+  }
   std::optional<StoredChange> split;
   if (ChangeExplains(validated)) {
     SELFCAL_ASSIGN_OR_RETURN(split, StoreSplit(tx, run, validated, options));

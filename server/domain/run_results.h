@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <string>
 
 #include "core/change/detect_change.h"
 #include "server/store/store.h"
@@ -18,6 +19,7 @@ absl::StatusOr<StoredCalibration> FinishRun(
     UnitOfWork* tx,
     std::int64_t run,
     const StoredCalibration& calibration,
+    const std::string& finding,
     const ChangeOptions& options);
 
 }  // namespace selfcal::server

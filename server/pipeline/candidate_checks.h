@@ -32,6 +32,8 @@ void AddNotTested(std::string name,
 // segments_used, pixel_residuals, segment_residuals, noise, preflight, effects.
 void CheckFit(const CheckContext& context,
               std::vector<ValidationCheck>* checks);
+// CandidateValidation::of_active, if `effects` fails.
+std::string EffectOnActive(const CheckContext& context);
 
 // candidate_estimate.cc: the estimate compared with the factory's and the
 // active one. prior_sigmas, prior_agreement, rank, sigma_growth.
@@ -39,7 +41,7 @@ void CheckEstimate(const CheckContext& context,
                    std::vector<ValidationCheck>* checks);
 
 // candidate_confirmation.cc: independent data. halves, disagreement,
-// held_out_probability, confirmed.
+// remembered, held_out_probability, confirmed.
 void CheckConfirmation(const CheckContext& context,
                        StoredValidation* validation);
 

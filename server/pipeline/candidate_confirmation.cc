@@ -112,6 +112,37 @@ void CheckDisagreement(const CheckContext& context,
   AddResult("disagreement", excess, limit, failure, checks);
 }
 
+// Segments without data that the fusion compares with the candidate, at its
+// own theta.
+void CheckRemembered(const CheckContext& context,
+                     std::vector<ValidationCheck>* checks) {
+  const RememberedUse& use = context.result.remembered;
+  if (use.compared == 0) return;
+  const double limit = context.limits.max_contradicting;
+  const double share = static_cast<double>(use.contradicting) / use.compared;
+  std::string failure;
+  if (!(share <= limit)) {
+    failure = fmt::format(
+        "{} of {} segments whose data is gone contradict it: some of them or "
+        "of the segments of the run are corrupted or of another device, or "
+        "the device has changed. Send new motion; quarantine a session that "
+        "is wrong (selfcal segment quarantine).",
+        use.contradicting,
+        use.compared);
+  }
+  AddResult("remembered", share, limit, failure, checks);
+  const AgreementTest& together = use.agreement;
+  if (failure.empty() && together.degrees > 0 &&
+      together.probability < context.limits.min_probability) {
+    checks->back().sentence = fmt::format(
+        "The segments whose data is gone contradict it together: chi-square "
+        "{:.1f} with {} degrees (probability {:.1e}). It does not use them.",
+        together.statistic,
+        together.degrees,
+        together.probability);
+  }
+}
+
 void CheckHeldOut(const CheckContext& context, StoredValidation* validation) {
   const StoredCalibration& active = context.evidence.active;
   const double limit = context.limits.min_probability;
@@ -163,6 +194,7 @@ void CheckConfirmation(const CheckContext& context,
                        StoredValidation* validation) {
   CheckHalves(context, &validation->checks);
   CheckDisagreement(context, &validation->checks);
+  CheckRemembered(context, &validation->checks);
   CheckHeldOut(context, validation);
   const int tests = (context.result.halves.degrees > 0 ? 1 : 0) +
                     (validation->held_out.candidate.degrees > 0 ? 1 : 0);

@@ -313,6 +313,27 @@ void CheckEffects(const CheckContext& context,
 
 }  // namespace
 
+std::string EffectOnActive(const CheckContext& context) {
+  const StoredCalibration& active = context.evidence.active;
+  const AbsentEffect* worst = WorstEffect(context);
+  if (!active.run || worst == nullptr) return "";
+  const int i = MatchComponents(TangentComponents(context.rig.factory),
+                                {worst->component})
+                    .front();
+  const double bias =
+      worst->bias_sigmas *
+      std::sqrt(context.result.covariance(i, i) / active.covariance(i, i));
+  if (!(bias > context.limits.max_bias_sigmas)) return "";
+  return fmt::format(
+      "Later segments show an effect that the rig does not estimate, most "
+      "likely {}: it shifts {} by {:.1f} sigma of this version. Create a rig "
+      "that estimates it (--block '{}=on').",
+      worst->block,
+      worst->component,
+      bias,
+      worst->block);
+}
+
 void CheckFit(const CheckContext& context,
               std::vector<ValidationCheck>* checks) {
   CheckObservations(context, checks);

@@ -114,10 +114,14 @@ CandidateValidation ValidateCandidate(const Rig& rig,
     CheckEstimate(context, &validation.checks);
     CheckConfirmation(context, &validation);
   }
+  bool effects_fail = false;
   for (const ValidationCheck& check : validation.checks) {
-    if (check.outcome == CheckOutcome::kFailed) {
-      validated.reasons.push_back(check.sentence);
-    }
+    if (check.outcome != CheckOutcome::kFailed) continue;
+    validated.reasons.push_back(check.sentence);
+    effects_fail = effects_fail || check.name == "effects";
+  }
+  if (effects_fail && validated.reasons.size() == 1) {
+    validated.of_active = EffectOnActive({rig, result, evidence, limits});
   }
   return validated;
 }

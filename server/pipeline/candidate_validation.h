@@ -71,6 +71,9 @@ struct CandidateLimits {
   // A component is treated as observed if its sigma is below this part of the
   // prior's. Chosen, not measured.
   double observed_below = 0.5;
+  // If a larger share of the segments that are remembered contradicts the
+  // candidate, one of the two is wrong, or the device has changed.
+  double max_contradicting = 0.5;
   // For effects that the rig does not estimate, and for the agreement of the
   // halves, of held-out segments with the candidate, and of the data with the
   // prior. Chosen, not measured: each of the tests
@@ -115,6 +118,8 @@ struct CandidateValidation {
   // Why it must not become active: the sentences of the checks that failed.
   // Empty if it may.
   std::vector<std::string> reasons;
+  // Why the active version must not be trusted either; empty: no reason.
+  std::string of_active;
 };
 
 // The checks, in this order:
@@ -132,8 +137,7 @@ struct CandidateValidation {
 // - preflight: the segments show none of the common mistakes (core/preflight)
 //   that bias a calibration;
 // - effects: no effect that the rig does not estimate shifts a component by
-// much
-//   more than its uncertainty;
+//   much more than its uncertainty;
 // - prior_sigmas: no free component is further from the factory's value than
 //   the tolerances allow;
 // - prior_agreement: the data does not contradict the prior, or determines
@@ -148,9 +152,15 @@ struct CandidateValidation {
 //   then `active` is in doubt, and a larger sigma is consistent;
 // - halves: calibrations on two halves of the segments agree;
 // - disagreement: each segment agrees with all others as far as noise allows;
+// - remembered: the segments without data do not contradict it by majority,
+//   nor all together. Not made if there are none near it;
 // - held_out_probability: the information of held-out segments is not too
 //   improbable under it (held_out.h), whichever one of them is left out;
 // - confirmed: halves or held_out_probability was tested.
+//
+// If only `effects` fails, and the bias of that component is too large for the
+// sigma that it has in `active` too, this version must not be trusted either:
+// it was computed on segments that did not show the effect yet.
 CandidateValidation ValidateCandidate(const Rig& rig,
                                       const CalibrationResult& result,
                                       const CandidateEvidence& evidence,

@@ -159,10 +159,11 @@ absl::Status ExamineUsed(const RunContext& context,
 }
 
 // Sets state, reasons, validation and verdict of the candidate, validated
-// against the active version.
-absl::Status Validate(const RunContext& context,
-                      const StoredRun& run,
-                      StoredCalibration* candidate) {
+// against the active version. Returns what was found about that version; empty:
+// nothing.
+absl::StatusOr<std::string> Validate(const RunContext& context,
+                                     const StoredRun& run,
+                                     StoredCalibration* candidate) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig,
                            context.store()->GetRig(run.rig));
   const CalibrationResult& result = candidate->report.value();
@@ -197,7 +198,7 @@ absl::Status Validate(const RunContext& context,
                                                : CalibrationState::kRejected;
   candidate->reasons = std::move(validated.reasons);
   candidate->validation = std::move(validated.validation);
-  return absl::OkStatus();
+  return std::move(validated.of_active);
 }
 
 }  // namespace
@@ -207,7 +208,8 @@ absl::StatusOr<StoredCalibration> ValidateAndFinish(
     const StoredRun& run,
     StoredCalibration candidate) {
   for (;;) {
-    SELFCAL_RETURN_IF_ERROR(Validate(context, run, &candidate));
+    SELFCAL_ASSIGN_OR_RETURN(const std::string finding,
+                             Validate(context, run, &candidate));
     // Before the run ends, so that a crash between the two repeats it, and
     // whoever sees the version sees the scores at it.
     const bool becomes_active = candidate.state == CalibrationState::kActive;
@@ -219,7 +221,7 @@ absl::StatusOr<StoredCalibration> ValidateAndFinish(
                   candidate.theta);
     }
     auto finished =
-        context.domain->FinishRun(context.claim, run.run, candidate);
+        context.domain->FinishRun(context.claim, run.run, candidate, finding);
     if (absl::IsAborted(finished.status())) continue;
     if (becomes_active && finished.ok() &&
         finished->state != CalibrationState::kActive) {

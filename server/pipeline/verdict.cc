@@ -71,8 +71,8 @@ void AddNotMade(const StoredValidation& validation, Sentences* sentences) {
 
 // A check that passed, and yet says that errors may be larger than stated.
 bool IsDoubt(const ValidationCheck& check) {
-  return check.name == "effects" && check.outcome == CheckOutcome::kPassed &&
-         !check.sentence.empty();
+  return (check.name == "effects" || check.name == "remembered") &&
+         check.outcome == CheckOutcome::kPassed && !check.sentence.empty();
 }
 
 void AddDoubts(const StoredValidation& validation, Sentences* sentences) {
@@ -123,8 +123,8 @@ Verdict VerdictOf(const StoredCalibration& calibration) {
   if (calibration.state == CalibrationState::kRejected) {
     return {VerdictKind::kNotTrustworthy, calibration.reasons};
   }
-  if (!calibration.disagreement.empty()) {
-    return {VerdictKind::kNotTrustworthy, {calibration.disagreement}};
+  if (!calibration.finding.empty()) {
+    return {VerdictKind::kNotTrustworthy, {calibration.finding}};
   }
   if (calibration.state == CalibrationState::kActive &&
       calibration.changed_since != 0) {

@@ -98,9 +98,9 @@ absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version) {
   return AnnounceCalibration(tx);
 }
 
-absl::Status InsertDisagreement(UnitOfWork* tx,
-                                std::int64_t version,
-                                const std::string& finding) {
+absl::Status InsertFinding(UnitOfWork* tx,
+                           std::int64_t version,
+                           const std::string& finding) {
   tx->Changed(RecordKind::kCalibration, version);
   return Statement(tx->db(),
                    "INSERT INTO disagreements (rig, version, time_ns, finding) "

@@ -122,7 +122,7 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(
     SELFCAL_RETURN_IF_ERROR(ParseValidation(validation, what, &calibration));
   }
   calibration.activation = row.Int(8);
-  calibration.disagreement = row.Text(9);
+  calibration.finding = row.Text(9);
   calibration.create_steady_ns = row.Int(10);
   calibration.changed_since = row.Int(13);
   return calibration;

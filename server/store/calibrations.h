@@ -73,8 +73,8 @@ absl::Status WriteState(UnitOfWork* tx,
 // Records that a version became active. Subscribers are notified in the order
 // of these records.
 absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version);
-// Records the finding of a verification; a version keeps the first one.
-absl::Status InsertDisagreement(UnitOfWork* tx,
+// Records StoredCalibration::finding; a version keeps the first one.
+absl::Status InsertFinding(UnitOfWork* tx,
                                 std::int64_t version,
                                 const std::string& finding);
 

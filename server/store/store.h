@@ -191,9 +191,10 @@ struct StoredCalibration {
   std::optional<StoredValidation> validation;  // if it was validated
   Verdict verdict;                             // likewise
   double seconds = 0;                          // to compute it
-  // The finding of a verification by which the two cores disagree on what this
-  // version rests on, so that it must not be trusted. Empty: none.
-  std::string disagreement;
+  // What was found after its validation, so that it must not be trusted: the
+  // two cores disagree on what it rests on, or later segments show an effect
+  // that shifts it. Empty: nothing.
+  std::string finding;
   // The newest change of the device that its run does not account for; 0: none.
   std::int64_t changed_since = 0;
   // Number of its newest activation, counted from 1 in its rig; 0 if it never

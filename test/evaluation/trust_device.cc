@@ -15,6 +15,7 @@
 #include "core/change/chi_square.h"
 #include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
+#include "server/pipeline/verdict.h"
 #include "test/evaluation/statistics.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
 
@@ -209,6 +210,7 @@ class Driver {
     outcome_.final_theta = active.theta;
     outcome_.final_covariance = active.covariance;
     outcome_.final_version = active.version;
+    outcome_.final_verdict = server::VerdictOf(active).kind;
     if (active.version > 1) outcome_.final_error = ErrorOf(active);
   }
 

@@ -79,6 +79,7 @@ struct TrustOutcome {
   Calibration final_theta;
   Eigen::MatrixXd final_covariance;
   std::int64_t final_version = 1;
+  server::VerdictKind final_verdict = server::VerdictKind::kUnknown;
   double simulation_seconds = 0;
   double pipeline_seconds = 0;
 };

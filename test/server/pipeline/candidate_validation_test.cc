@@ -204,6 +204,26 @@ TEST_F(CandidateTest, AnEffectThatShiftsItMustBeEstimated) {
   EXPECT_EQ(OutcomeOf("effects"), CheckOutcome::kNotTested);
 }
 
+TEST_F(CandidateTest, AnEffectAlsoShiftsTheActiveVersion) {
+  evidence_.effects = {
+      {{"cam0.time_offset", {90, 1, 1e-20}, 6, "cam0.q_CI.x"}}};
+  // The factory's values were not computed from segments.
+  EXPECT_EQ(Validate().of_active, "");
+  evidence_.active.run = 3;
+  EXPECT_THAT(Validate().of_active,
+              AllOf(HasSubstr("cam0.q_CI.x by 6.0 sigma"),
+                    HasSubstr("--block 'cam0.time_offset=on'")));
+  // It is less certain, and the bias matters less for it.
+  evidence_.active.covariance *= 4;
+  EXPECT_THAT(Validate().of_active, HasSubstr("cam0.q_CI.x by 3.0 sigma"));
+  evidence_.active.covariance *= 4;
+  EXPECT_EQ(Validate().of_active, "");
+  // Segments that contradict each other may show effects that there are not.
+  evidence_.active.covariance = result_.covariance;
+  result_.halves = {83.0, 26, 9e-8};
+  EXPECT_EQ(Validate().of_active, "");
+}
+
 TEST_F(CandidateTest, ValuesMustLieWithinTenPriorSigmasOfTheFactory) {
   const auto components = TangentComponents(rig_.factory);
   const Eigen::VectorXd prior = PriorSigmas(rig_);
@@ -359,6 +379,25 @@ TEST_F(CandidateTest, SegmentsMustAgreeBetterIfTheImuSeemsNoisy) {
   EXPECT_EQ(compare(NoiseKind::kPixel, 2.1, 1.27), CheckOutcome::kPassed);
   EXPECT_EQ(compare(NoiseKind::kGyroBiasWalk, 2.1, 1.27),
             CheckOutcome::kPassed);
+}
+
+TEST_F(CandidateTest, MostSegmentsWithoutDataMustAgree) {
+  result_.remembered.compared = 9;
+  result_.remembered.contradicting = 4;
+  EXPECT_EQ(OutcomeOf("remembered"), CheckOutcome::kPassed);
+  EXPECT_EQ(TheVerdict().kind, VerdictKind::kGood);
+  result_.remembered.contradicting = 5;
+  EXPECT_THAT(Problem("remembered"), HasSubstr("5 of 9"));
+}
+
+TEST_F(CandidateTest, SegmentsWithoutDataThatContradictItTogetherMakeItWeak) {
+  result_.remembered.compared = 9;
+  result_.remembered.agreement = {30, 26, 0.3};
+  EXPECT_EQ(TheVerdict().kind, VerdictKind::kGood);
+  result_.remembered.agreement = {83, 26, 9e-8};
+  EXPECT_THAT(Problems(), IsEmpty());
+  EXPECT_EQ(TheVerdict().kind, VerdictKind::kWeak);
+  EXPECT_THAT(TheVerdict().sentences, ElementsAre(HasSubstr("83.0 with 26")));
 }
 
 TEST_F(CandidateTest, WithoutAnyTestOfOtherDataItIsNotConfirmed) {

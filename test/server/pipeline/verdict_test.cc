@@ -48,11 +48,11 @@ TEST(VerdictTest, ThatOfAVersionIsTheStoredOne) {
   version.verdict = {VerdictKind::kGood, {"noted"}};
   EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kGood);
   EXPECT_THAT(VerdictOf(version).sentences, ElementsAre("noted"));
-  version.disagreement = "The two cores disagree.";
+  version.finding = "The two cores disagree.";
   EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kNotTrustworthy);
   EXPECT_THAT(VerdictOf(version).sentences,
               ElementsAre("The two cores disagree."));
-  version.disagreement.clear();
+  version.finding.clear();
   version.changed_since = 2;
   EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kNotTrustworthy);
   EXPECT_THAT(VerdictOf(version).sentences, ElementsAre(HasSubstr("change 2")));

@@ -98,7 +98,7 @@ class VerificationTest : public PipelineTest {
   std::string DisagreementOf(std::int64_t version) {
     const auto calibration = store_->GetCalibration("a", version);
     EXPECT_TRUE(calibration.ok()) << calibration.status();
-    return calibration.ok() ? calibration->disagreement : "";
+    return calibration.ok() ? calibration->finding : "";
   }
 
   using Subject = PipelineObserver::CheckSubject;

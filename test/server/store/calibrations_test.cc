@@ -54,7 +54,7 @@ SELFCAL_STORE_TEST_SUITE(CalibrationsTest);
 TEST_P(CalibrationsTest, TheFirstDisagreementStaysWithItsVersion) {
   const Rig rig = RigWithRun("a");
   ASSERT_TRUE(domain_->FinishRun("a", 1, Candidate(rig)).ok());
-  EXPECT_EQ(store_->GetActiveCalibration("a")->disagreement, "");
+  EXPECT_EQ(store_->GetActiveCalibration("a")->finding, "");
   ASSERT_TRUE(domain_->ReportDisagreement("a", 2, "by 3 sigma").ok());
   ASSERT_TRUE(domain_->ReportDisagreement("a", 2, "by 5 sigma").ok());
   EXPECT_TRUE(
@@ -65,10 +65,9 @@ TEST_P(CalibrationsTest, TheFirstDisagreementStaysWithItsVersion) {
   const auto active = store_->GetActiveCalibration("a");
   ASSERT_TRUE(active.ok()) << active.status();
   EXPECT_EQ(active->state, CalibrationState::kActive);
-  EXPECT_EQ(active->disagreement, "by 3 sigma");
-  EXPECT_EQ(store_->GetCalibration("a", 1)->disagreement, "");
-  EXPECT_EQ(store_->ListCalibrations("a", {})->items[0].disagreement,
-            "by 3 sigma");
+  EXPECT_EQ(active->finding, "by 3 sigma");
+  EXPECT_EQ(store_->GetCalibration("a", 1)->finding, "");
+  EXPECT_EQ(store_->ListCalibrations("a", {})->items[0].finding, "by 3 sigma");
   std::vector<std::string> details;
   const auto events = store_->ListEvents({100, ""}, "a");
   ASSERT_TRUE(events.ok()) << events.status();

@@ -11,6 +11,7 @@
 namespace selfcal::server {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -130,6 +131,26 @@ TEST_P(LifecycleTest, CandidateOfARunThatEndsOtherwiseIsRejected) {
   EXPECT_EQ(rejected->state, CalibrationState::kRejected);
   ASSERT_EQ(rejected->reasons.size(), 1u);
   EXPECT_THAT(rejected->reasons[0], HasSubstr("by hand"));
+}
+
+TEST_P(LifecycleTest, FindingOfTheActiveVersionIsKeptWithItAndIsOneMoreReason) {
+  Finish(CalibrationState::kActive);
+  const StoredRun run = Begin();
+  StoredCalibration validated = Found(CalibrationState::kRejected);
+  validated.reasons = {"an effect shifts it"};
+  ASSERT_TRUE(
+      domain_->FinishRun("a", run.run, validated, "by 3 of its sigmas").ok());
+  Reopen();
+  const auto active = store_->GetActiveCalibration("a");
+  EXPECT_EQ(active->version, 2);
+  EXPECT_EQ(active->finding, "by 3 of its sigmas");
+  const auto rejected = store_->GetCalibration("a", 3);
+  EXPECT_EQ(rejected->finding, "");
+  EXPECT_THAT(rejected->reasons,
+              ElementsAre("an effect shifts it",
+                          AllOf(HasSubstr("Version 2"),
+                                HasSubstr("by 3 of its sigmas"))));
+  EXPECT_THAT(LastEvent().detail, HasSubstr("by 3 of its sigmas"));
 }
 
 TEST_P(LifecycleTest, RejectedOneKeepsReasonsAndFigures) {
