@@ -29,7 +29,8 @@ void AddCompletionCommand(CLI::App* app, Context* context);
 // Verbs of rig.
 void AddRigCreation(CLI::App* rig, Context* context);
 void AddImuPresets(CLI::App* rig, Context* context);
-void AddRigChanges(CLI::App* rig, Context* context);
+void AddRigUpdate(CLI::App* rig, Context* context);
+void AddRigDeletion(CLI::App* rig, Context* context);
 void AddAttention(CLI::App* rig, Context* context);
 CLI::App* AddCoach(CLI::App* parent, const std::string& name, Context* context);
 CLI::App* AddVerify(CLI::App* parent,

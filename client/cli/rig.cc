@@ -103,7 +103,8 @@ void AddRigCommands(CLI::App* app, Context* context) {
   });
 
   AddImuPresets(rig, context);
-  AddRigChanges(rig, context);
+  AddRigUpdate(rig, context);
+  AddRigDeletion(rig, context);
   AddAttention(rig, context);
 
   CLI::App* show = rig->add_subcommand("show", "Show a rig");

@@ -11,29 +11,23 @@
 #include <utility>
 #include <vector>
 
+#include "client/cli/bulk.h"
 #include "client/cli/commands.h"
-#include "client/cli/confirmation.h"
-#include "client/cli/instruction.h"
 #include "client/cli/time_input.h"
-#include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
-#include "selfcal/v1/rig.grpc.pb.h"
 
 namespace selfcal::client {
 namespace {
 
 using google::protobuf::util::TimeUtil;
 using CalibrationService = v1::CalibrationService::StubInterface;
-using RigService = v1::RigService::StubInterface;
 
 struct Options {
-  std::string filter;
+  BulkOptions bulk;
   std::string reason;
   std::string since;
   bool again = false;
-  bool dry_run = false;
-  bool yes = false;
 };
 
 struct Rollback {
@@ -119,36 +113,27 @@ void PrintPlans(const Context& context, const std::vector<Rollback>& plans) {
   context.Print(table);
 }
 
-// Goes on after a rig that fails; returns the number of these. Where a device
-// reports the rig, the device is instructed.
-int CarryOut(const Context& context,
-             CalibrationService* stub,
-             const std::vector<Rollback>& plans,
-             const std::string& reason) {
-  int failed = 0;
+std::vector<BulkChange> ChangesOf(CalibrationService* stub,
+                                  const std::vector<Rollback>& plans,
+                                  const std::string& reason) {
+  std::vector<BulkChange> changes;
   for (const Rollback& plan : plans) {
     v1::ActivateCalibrationRequest request;
     request.set_name(
         ChildName(plan.rig, "calibrations", std::to_string(plan.to.version())));
     request.set_reason(reason);
-    v1::Calibration calibration;
-    const grpc::Status status = Call<CalibrationService>(
-        stub, &CalibrationService::ActivateCalibration, request, &calibration);
-    if (status.ok()) continue;
-    v1::Instruction instruction;
-    *instruction.mutable_activate_calibration() = request;
-    grpc::Status failure = status;
-    if (const auto given =
-            InsteadOf(status, context, plan.rig, instruction, &failure)) {
-      // --json prints the versions alone.
-      if (!context.json) PrintGiven(context, *given);
-      continue;
-    }
-    ++failed;
-    PrintError(fmt::format(
-        "{} is not rolled back: {}", plan.rig, failure.error_message()));
+    BulkChange& change = changes.emplace_back();
+    change.rig = plan.rig;
+    *change.instruction.mutable_activate_calibration() = request;
+    change.call = [stub, request] {
+      v1::Calibration calibration;
+      return Call<CalibrationService>(stub,
+                                      &CalibrationService::ActivateCalibration,
+                                      request,
+                                      &calibration);
+    };
   }
-  return failed;
+  return changes;
 }
 
 int RollBack(Context* context, const Options& options) {
@@ -158,16 +143,12 @@ int RollBack(Context* context, const Options& options) {
     if (!time.ok()) return FailInput(time.status());
     since = *time;
   }
-  const auto rig_stub = v1::RigService::NewStub(context->Channel());
-  v1::ListRigsRequest request;
-  request.set_filter(options.filter);
-  v1::ListRigsResponse rigs;
-  grpc::Status status = CallForAllPages<RigService>(
-      rig_stub.get(), &RigService::ListRigs, request, &rigs);
+  std::vector<v1::Rig> rigs;
+  grpc::Status status = ReadRigs(*context, options.bulk.filter, &rigs);
   if (!status.ok()) return Fail(*context, status);
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   std::vector<Rollback> plans;
-  for (const v1::Rig& rig : rigs.rigs()) {
+  for (const v1::Rig& rig : rigs) {
     status = Plan(*context,
                   stub.get(),
                   LastPart(rig.name()),
@@ -177,18 +158,10 @@ int RollBack(Context* context, const Options& options) {
     if (!status.ok()) return Fail(*context, status);
   }
   PrintPlans(*context, plans);
-  if (options.dry_run || plans.empty()) return kDone;
-  const std::string rig_count =
-      CountText(static_cast<std::int64_t>(plans.size()), "rig");
-  if (!options.yes && !Confirmed("Roll back " + rig_count + " at " +
-                                 context->target.address + "?")) {
-    PrintError("nothing was changed; use --yes to go on without a prompt");
-    return kUsage;
-  }
-  const int failed = CarryOut(*context, stub.get(), plans, options.reason);
-  if (failed == 0) return kDone;
-  PrintError(fmt::format("{} of {} failed", failed, rig_count));
-  return kFailed;
+  return CarryOut(*context,
+                  options.bulk,
+                  {"Roll back", "rolled back"},
+                  ChangesOf(stub.get(), plans, options.reason));
 }
 
 }  // namespace
@@ -201,7 +174,7 @@ void AddCalibrationRollback(CLI::App* calibrations, Context* context) {
       "filter");
   rollback
       ->add_option("--filter",
-                   options->filter,
+                   options->bulk.filter,
                    "Which rigs, e.g. 'labels.batch = \"2026-10\"'")
       ->required();
   rollback
@@ -218,9 +191,7 @@ void AddCalibrationRollback(CLI::App* calibrations, Context* context) {
       options->again,
       "Also where a version was rolled back before, and no newer "
       "one has become active since");
-  rollback->add_flag(
-      "--dry-run", options->dry_run, "Only show what would be rolled back");
-  rollback->add_flag("--yes", options->yes, "Do not ask for confirmation");
+  AddBulkFlags(rollback, &options->bulk);
   rollback->callback([context, options] {
     context->command = [context, options] {
       return RollBack(context, *options);

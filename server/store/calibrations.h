@@ -75,7 +75,7 @@ absl::Status WriteState(UnitOfWork* tx,
 absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version);
 // Records StoredCalibration::finding; a version keeps the first one.
 absl::Status InsertFinding(UnitOfWork* tx,
-                                std::int64_t version,
-                                const std::string& finding);
+                           std::int64_t version,
+                           const std::string& finding);
 
 }  // namespace selfcal::server

@@ -69,6 +69,7 @@ struct CannedDaemon final : v1::RigService::Service,
   bool stopping = false;  // and so cancels
   std::string last_name;
   std::string last_reason;
+  std::vector<v1::UpdateRigRequest> updates;
   std::vector<v1::MotionSegment> data;  // of the segments, while it is there
   std::string cancelled;                // the run
   std::string last_filter;
@@ -111,9 +112,18 @@ struct CannedDaemon final : v1::RigService::Service,
     }
     return Missing(request->name());
   }
+  grpc::Status UpdateRig(grpc::ServerContext*,
+                         const v1::UpdateRigRequest* request,
+                         v1::Rig* response) override {
+    if (request->rig().name() == deleted) return Missing(deleted);
+    updates.push_back(*request);
+    *response = request->rig();
+    return grpc::Status::OK;
+  }
   grpc::Status ListRigs(grpc::ServerContext*,
                         const v1::ListRigsRequest* request,
                         v1::ListRigsResponse* response) override {
+    last_filter = request->filter();
     FillCannedPage(*request, rigs, response, [&](const v1::Rig& rig) {
       *response->add_rigs() = rig;
     });

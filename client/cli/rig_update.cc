@@ -1,12 +1,17 @@
-// rig update, rig delete.
+// rig update: of one rig, or of all rigs of a filter.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <google/protobuf/util/field_mask_util.h>
+#include <google/protobuf/util/message_differencer.h>
 #include <google/protobuf/util/time_util.h>
 
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "client/cli/bulk.h"
 #include "client/cli/commands.h"
 #include "client/cli/component_settings.h"
 #include "client/cli/instruction.h"
@@ -16,11 +21,14 @@
 namespace selfcal::client {
 namespace {
 
+using google::protobuf::util::FieldMaskUtil;
+using google::protobuf::util::MessageDifferencer;
 using google::protobuf::util::TimeUtil;
 using RigService = v1::RigService::StubInterface;
 
 struct UpdateOptions {
-  std::string rig;
+  std::string rig;  // empty: those of the filter
+  BulkOptions bulk;
   std::vector<std::string> labels;  // name=value
   std::vector<std::string> removed_labels;
   std::vector<std::string> prior_sigmas;    // pattern=value
@@ -76,7 +84,7 @@ absl::Status ReadRequest(const UpdateOptions& options,
                          const v1::Rig& rig,
                          v1::UpdateRigRequest* request) {
   v1::Rig* update = request->mutable_rig();
-  update->set_name(RigName(options.rig));
+  update->set_name(rig.name());
   auto* mask = request->mutable_update_mask();
   absl::Status status = ReadLabels(options, rig, request);
   if (!status.ok()) return status;
@@ -126,7 +134,19 @@ absl::Status ReadRequest(const UpdateOptions& options,
   return absl::OkStatus();
 }
 
-int Update(Context* context, const UpdateOptions& options) {
+const FlagNames kFlags = {{"rig.name", "RIG"},
+                          {"rig.labels", "--label"},
+                          {"rig.prior_sigmas", "--prior-sigma"},
+                          {"rig.walk_densities", "--walk-density"},
+                          {"rig.min_gain_nats", "--min-gain"},
+                          {"rig.retrigger_fraction", "--retrigger-fraction"},
+                          {"rig.table_max_age", "--table-max-age"},
+                          {"rig.recalibration_min_interval", "--min-interval"},
+                          {"rig.calibration_max_age", "--calibration-max-age"},
+                          {"rig.imu.gyro_max", "--gyro-max"},
+                          {"rig.imu.accel_max", "--accel-max"}};
+
+int UpdateOne(Context* context, const UpdateOptions& options) {
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::GetRigRequest get;
   get.set_name(RigName(options.rig));
@@ -136,18 +156,7 @@ int Update(Context* context, const UpdateOptions& options) {
   v1::UpdateRigRequest request;
   const absl::Status read = ReadRequest(options, rig, &request);
   if (!read.ok()) return FailInput(read);
-  context->flags.merge(
-      FlagNames{{"rig.name", "RIG"},
-                {"rig.labels", "--label"},
-                {"rig.prior_sigmas", "--prior-sigma"},
-                {"rig.walk_densities", "--walk-density"},
-                {"rig.min_gain_nats", "--min-gain"},
-                {"rig.retrigger_fraction", "--retrigger-fraction"},
-                {"rig.table_max_age", "--table-max-age"},
-                {"rig.recalibration_min_interval", "--min-interval"},
-                {"rig.calibration_max_age", "--calibration-max-age"},
-                {"rig.imu.gyro_max", "--gyro-max"},
-                {"rig.imu.accel_max", "--accel-max"}});
+  context->flags.merge(FlagNames(kFlags));
   status = Call<RigService>(stub.get(), &RigService::UpdateRig, request, &rig);
   v1::Instruction instruction;
   *instruction.mutable_update_rig() = request;
@@ -166,29 +175,104 @@ int Update(Context* context, const UpdateOptions& options) {
   return kDone;
 }
 
-struct RigDeletion {
-  std::string rig;
-  std::string reason;
+struct Plan {
+  v1::UpdateRigRequest request;
+  v1::Rig after;  // the rig, with its changes
 };
 
-int DeleteRig(Context* context, const RigDeletion& options) {
-  const auto stub = v1::RigService::NewStub(context->Channel());
-  v1::DeleteRigRequest request;
-  request.set_name(RigName(options.rig));
-  request.set_reason(options.reason);
-  google::protobuf::Empty response;
-  const auto status =
-      Call<RigService>(stub.get(), &RigService::DeleteRig, request, &response);
-  if (!status.ok()) return Fail(*context, status);
-  if (!context->json) PrintText(fmt::format("deleted {}\n", request.name()));
-  return kDone;
+// Leaves out the rigs that are so already.
+absl::Status MakePlans(const UpdateOptions& options,
+                       const std::vector<v1::Rig>& rigs,
+                       std::vector<Plan>* plans) {
+  FieldMaskUtil::MergeOptions replace;
+  replace.set_replace_message_fields(true);
+  replace.set_replace_repeated_fields(true);
+  for (const v1::Rig& rig : rigs) {
+    Plan plan;
+    const absl::Status read = ReadRequest(options, rig, &plan.request);
+    if (!read.ok()) {
+      return absl::Status(
+          read.code(),
+          fmt::format("{}: {}", rig.name(), std::string(read.message())));
+    }
+    plan.after = rig;
+    FieldMaskUtil::MergeMessageTo(
+        plan.request.rig(), plan.request.update_mask(), replace, &plan.after);
+    if (!MessageDifferencer::Equals(rig, plan.after)) {
+      plans->push_back(std::move(plan));
+    }
+  }
+  return absl::OkStatus();
 }
 
-void AddUpdate(CLI::App* rig, Context* context) {
+// Prints the rigs alone with --json, one by one.
+void PrintPlans(const Context& context, const std::vector<Plan>& plans) {
+  if (context.json) {
+    for (const Plan& plan : plans) context.PrintJson(plan.after);
+    return;
+  }
+  Table table({{"rig"}, {"changes"}});
+  for (const Plan& plan : plans) {
+    table.Add({LastPart(plan.after.name()),
+               fmt::format(
+                   "{}", fmt::join(plan.request.update_mask().paths(), ", "))});
+  }
+  context.Print(table);
+}
+
+std::vector<BulkChange> ChangesOf(RigService* stub,
+                                  const std::vector<Plan>& plans) {
+  std::vector<BulkChange> changes;
+  for (const Plan& plan : plans) {
+    BulkChange& change = changes.emplace_back();
+    change.rig = LastPart(plan.after.name());
+    *change.instruction.mutable_update_rig() = plan.request;
+    change.call = [stub, request = plan.request] {
+      v1::Rig rig;
+      return Call<RigService>(stub, &RigService::UpdateRig, request, &rig);
+    };
+  }
+  return changes;
+}
+
+int UpdateAll(Context* context, const UpdateOptions& options) {
+  std::vector<v1::Rig> rigs;
+  const grpc::Status status = ReadRigs(*context, options.bulk.filter, &rigs);
+  if (!status.ok()) return Fail(*context, status);
+  std::vector<Plan> plans;
+  const absl::Status planned = MakePlans(options, rigs, &plans);
+  if (!planned.ok()) return FailInput(planned);
+  PrintPlans(*context, plans);
+  const auto stub = v1::RigService::NewStub(context->Channel());
+  return CarryOut(*context,
+                  options.bulk,
+                  {"Change", "changed"},
+                  ChangesOf(stub.get(), plans));
+}
+
+int Update(Context* context, const UpdateOptions& options) {
+  if (!options.bulk.filter.empty()) return UpdateAll(context, options);
+  if (!options.rig.empty()) return UpdateOne(context, options);
+  return FailInput(absl::InvalidArgumentError(
+      "name a rig, or the rigs of a filter (--filter)"));
+}
+
+}  // namespace
+
+void AddRigUpdate(CLI::App* rig, Context* context) {
   const auto options = std::make_shared<UpdateOptions>();
   CLI::App* update = rig->add_subcommand(
-      "update", "Change the labels, tolerances or thresholds of a rig");
-  update->add_option("RIG", options->rig)->required();
+      "update",
+      "Change the labels, tolerances or thresholds of a rig, or of all rigs of "
+      "a filter");
+  CLI::Option* one = update->add_option("RIG", options->rig);
+  update
+      ->add_option("--filter",
+                   options->bulk.filter,
+                   "All rigs of it, e.g. 'labels.batch = \"2026-10\"', "
+                   "instead of RIG")
+      ->excludes(one);
+  AddBulkFlags(update, &options->bulk);
   update->add_option(
       "--label", options->labels, "NAME=VALUE: add or change; repeatable");
   update->add_option("--remove-label", options->removed_labels, "repeatable");
@@ -224,28 +308,6 @@ void AddUpdate(CLI::App* rig, Context* context) {
                      "Full scale of the accelerometer [m/s^2]; 0: the default");
   update->callback([context, options] {
     context->command = [context, options] { return Update(context, *options); };
-  });
-}
-
-}  // namespace
-
-void AddRigChanges(CLI::App* rig, Context* context) {
-  AddUpdate(rig, context);
-  const auto options = std::make_shared<RigDeletion>();
-  CLI::App* remove = rig->add_subcommand(
-      "delete",
-      "Delete a rig with all its segments, runs and calibrations. This cannot "
-      "be undone");
-  remove->add_option("RIG", options->rig)->required();
-  remove
-      ->add_option("--reason",
-                   options->reason,
-                   "The reason; the event log records it with your name")
-      ->required();
-  remove->callback([context, options] {
-    context->command = [context, options] {
-      return DeleteRig(context, *options);
-    };
   });
 }
 

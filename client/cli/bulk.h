@@ -1,0 +1,53 @@
+// Commands that change every rig of a filter. They show what they would do,
+// ask, and go on after a rig that fails.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "client/cli/context.h"
+#include "selfcal/v1/rig.pb.h"
+#include "selfcal/v1/uplink.pb.h"
+
+namespace selfcal::client {
+
+struct BulkOptions {
+  std::string filter;
+  bool dry_run = false;
+  bool yes = false;
+};
+
+// --dry-run and --yes.
+void AddBulkFlags(CLI::App* command, BulkOptions* options);
+
+// The rigs of the filter.
+grpc::Status ReadRigs(const Context& context,
+                      const std::string& filter,
+                      std::vector<v1::Rig>* rigs);
+
+struct BulkChange {
+  std::string rig;
+  std::function<grpc::Status()> call;
+  // By which the device makes the call, if it reports the rig.
+  v1::Instruction instruction = {};
+};
+
+// How messages name a change: "Roll back 3 rigs at ...?", "tablet is not rolled
+// back: ...".
+struct BulkWords {
+  std::string imperative;  // "Roll back"
+  std::string participle;  // "rolled back"
+};
+
+// Makes the changes, which have been shown, unless this is a dry run or the
+// answer to the question is no. Returns the exit code.
+int CarryOut(const Context& context,
+             const BulkOptions& options,
+             const BulkWords& words,
+             const std::vector<BulkChange>& changes);
+
+}  // namespace selfcal::client
