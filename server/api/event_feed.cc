@@ -8,11 +8,15 @@ namespace {
 
 constexpr std::chrono::milliseconds kPollInterval{500};
 constexpr int kEvents = 50;  // number of events that a poll reads
+// Rigs are polled less often: their list costs more, and the segments that the
+// pipeline stores are reported at once.
+constexpr int kPollsOfEvents = 4;  // for each poll of rigs
+constexpr int kRigs = 20;
 
 }  // namespace
 
 EventFeed::EventFeed(Store* store, PipelineObserver* next)
-    : store_(store), next_(next), poller_([this] { PollEvents(); }) {}
+    : store_(store), next_(next), poller_([this] { Poll(); }) {}
 
 EventFeed::~EventFeed() {
   {
@@ -25,7 +29,12 @@ EventFeed::~EventFeed() {
 
 void EventFeed::OnVerdict(const std::string& rig, Verdict verdict) {
   if (next_ != nullptr) next_->OnVerdict(rig, verdict);
-  if (verdict == Verdict::kStored) Notify(v1::Change::SEGMENTS, rig);
+  if (verdict != Verdict::kStored) return;
+  {
+    const std::lock_guard lock(mutex_);
+    stored_.insert(rig);
+  }
+  Notify(v1::Change::SEGMENTS, rig);
 }
 
 void EventFeed::OnScore(const SegmentInformation& information, double seconds) {
@@ -47,8 +56,9 @@ std::shared_ptr<void> EventFeed::Subscribe(const std::string& rig,
   const auto events = store_->ListNewestEvents({kEvents, ""}, rig);
   auto known = std::make_shared<const EventIds>(
       events.ok() ? IdsOf(events->items) : EventIds());
+  auto seen = std::make_shared<const Seen>(ReadSeen(rig).value_or(Seen()));
   auto reader = std::make_shared<Reader>(
-      Reader{rig, std::move(known), std::move(on_change)});
+      Reader{rig, std::move(known), std::move(seen), std::move(on_change)});
   const std::lock_guard lock(mutex_);
   readers_.push_back(reader);
   return reader;
@@ -74,19 +84,36 @@ void EventFeed::Notify(v1::Change::What what, const std::string& rig) {
   }
 }
 
-void EventFeed::PollEvents() {
+void EventFeed::Poll() {
   std::unique_lock lock(mutex_);
+  int polls = 0;
   while (!stop_.wait_for(lock, kPollInterval, [this] { return stopping_; })) {
     std::set<std::string> rigs;
     for (const auto& reader : Readers()) rigs.insert(reader->rig);
+    const bool of_segments = ++polls % kPollsOfEvents == 0;
+    std::set<std::string> notified;
+    if (of_segments) notified.swap(stored_);
     lock.unlock();
     for (const std::string& rig : rigs) {
       // If the store fails now, the next poll tries again.
       const auto events = store_->ListNewestEvents({kEvents, ""}, rig);
       if (events.ok()) NotifyOfEvents(rig, events->items);
+      if (!of_segments) continue;
+      const auto seen = ReadSeen(rig);
+      if (seen) NotifyOfSegments(rig, *seen, notified);
     }
     lock.lock();
   }
+}
+
+std::optional<EventFeed::Seen> EventFeed::ReadSeen(const std::string& rig) {
+  const auto rigs = store_->ListRigSummaries(
+      {.order = RigQuery::Order::kLastSeen, .descending = true, .name = rig},
+      {kRigs, ""});
+  if (!rigs.ok()) return std::nullopt;
+  Seen seen;
+  for (const RigSummary& one : rigs->items) seen[one.rig] = one.last_seen_ns;
+  return seen;
 }
 
 EventFeed::EventId EventFeed::IdOf(const StoredEvent& event) {
@@ -115,6 +142,28 @@ void EventFeed::NotifyOfEvents(const std::string& rig,
       reader->on_change(v1::Change::EVENTS, event.rig);
     }
     reader->known = ids;
+  }
+}
+
+void EventFeed::NotifyOfSegments(const std::string& rig,
+                                 const Seen& seen,
+                                 const std::set<std::string>& notified) {
+  const auto now = std::make_shared<const Seen>(seen);
+  const std::lock_guard lock(mutex_);
+  for (const auto& reader : Readers()) {
+    if (reader->rig != rig) continue;
+    int newer = 0;
+    for (const auto& [id, last_seen_ns] : seen) {
+      const auto before = reader->seen->find(id);
+      if (before != reader->seen->end() && before->second == last_seen_ns) {
+        continue;
+      }
+      ++newer;
+      if (!notified.contains(id)) reader->on_change(v1::Change::SEGMENTS, id);
+    }
+    // There may be others beyond these.
+    if (newer == kRigs) reader->on_change(v1::Change::EVERYTHING, "");
+    reader->seen = now;
   }
 }
 

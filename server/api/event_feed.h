@@ -1,15 +1,17 @@
 // Reports that something has changed, so that whoever shows it reads it again.
-// Changes by the pipeline come from its observer; changes that callers commit
-// come from the event log, which is polled while there is a reader. Any thread
-// may call.
+// Changes by the pipeline come from its observer. The store is polled while
+// there is a reader: for events, and for segments that other daemons store or
+// devices report. Any thread may call.
 #pragma once
 
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -45,12 +47,15 @@ class EventFeed final : public PipelineObserver {
   // Steady time, rig and number: identify an event.
   using EventId = std::tuple<std::int64_t, std::string, std::int64_t>;
   using EventIds = std::set<EventId>;
+  // When the rigs were last seen that were seen last.
+  using Seen = std::map<std::string, std::int64_t>;
 
   struct Reader {
     std::string rig;
     // Its newest events, when it was last looked for some: among those of all
     // rigs, one may come before others that were committed earlier.
     std::shared_ptr<const EventIds> known;
+    std::shared_ptr<const Seen> seen;
     OnChange on_change;
   };
 
@@ -60,16 +65,24 @@ class EventFeed final : public PipelineObserver {
   void Notify(v1::Change::What what, const std::string& rig);
   // The readers that exist; with the lock held.
   std::vector<std::shared_ptr<Reader>> Readers();
-  void PollEvents();
+  void Poll();
+  // Of the rig, or of all if it is empty; nullopt if it cannot be read now.
+  std::optional<Seen> ReadSeen(const std::string& rig);
   // `newest` are the newest events of the rig, or of all if it is empty.
   void NotifyOfEvents(const std::string& rig,
                       const std::vector<StoredEvent>& newest);
+  // `notified` are rigs of whose segments readers know already.
+  void NotifyOfSegments(const std::string& rig,
+                        const Seen& seen,
+                        const std::set<std::string>& notified);
 
   Store* store_;
   PipelineObserver* next_;
   std::mutex mutex_;  // guards what follows
   std::condition_variable stop_;
   std::list<std::weak_ptr<Reader>> readers_;
+  // Rigs of which the pipeline stored segments since they were last polled.
+  std::set<std::string> stored_;
   bool stopping_ = false;
   std::thread poller_;
 };
