@@ -290,13 +290,17 @@ void AddRigConditions(const RigQuery& query,
                       const std::string& rigs,
                       SqlCondition* condition,
                       const std::string& from) {
-  const auto with_label = [&](const auto& label) {
-    const std::string name = condition->Parameter(label.first);
-    return fmt::format(
-        "SELECT l.rig FROM rig_labels l WHERE l.name = {} AND l.value = {}{}",
-        name,
-        condition->Parameter(label.second),
-        from.empty() ? "" : " AND l.rig >= " + from);
+  const auto with_any = [&](const auto& labels) {
+    std::vector<std::string> any;
+    for (const auto& [name, value] : labels) {
+      const std::string parameter = condition->Parameter(name);
+      any.push_back(fmt::format("(l.name = {} AND l.value = {})",
+                                parameter,
+                                condition->Parameter(value)));
+    }
+    return fmt::format("SELECT l.rig FROM rig_labels l WHERE ({}){}",
+                       fmt::join(any, " OR "),
+                       from.empty() ? "" : " AND l.rig >= " + from);
   };
   if (!query.text.empty()) {
     SqlCondition names = condition->Next();
@@ -312,7 +316,9 @@ void AddRigConditions(const RigQuery& query,
   if (!query.name.empty()) {
     condition->And(rigs + ".id = " + condition->Parameter(query.name));
   }
-  for (const auto& label : query.labels) is_one_of(with_label(label));
+  for (const auto& label : query.labels) {
+    is_one_of(with_any(std::vector{label}));
+  }
   if (query.with_alarms) condition->And(rigs + ".alarms > 0");
   if (query.choice) {
     // One set of keys: with alternatives on the row itself, planners would read
@@ -322,8 +328,8 @@ void AddRigConditions(const RigQuery& query,
       chosen.push_back("SELECT c.rig FROM rigs c WHERE c.id = " +
                        condition->Parameter(name));
     }
-    for (const auto& label : query.choice->labels) {
-      chosen.push_back(with_label(label));
+    if (!query.choice->labels.empty()) {
+      chosen.push_back(with_any(query.choice->labels));
     }
     if (chosen.empty()) {
       condition->And("FALSE");
