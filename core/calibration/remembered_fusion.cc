@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/calibration/memory_split.h"
+#include "core/calibration/segment_agreement.h"
 #include "core/calibration/settled_ends.h"
 #include "core/information/segment_scorer.h"
 
@@ -61,12 +62,12 @@ class Fusion {
     std::vector<JoinedSegment> compared = Near();
     ExcludeContradictions();
     RememberedUse& use = result_.use;
-    if (2 * use.contradicting > use.compared) {
-      // They may be of the device before or after a change.
+    const bool most_contradict = 2 * use.contradicting > use.compared;
+    if (most_contradict) {
       use.unused = "most of them contradict the segments whose data is kept";
-    } else {
-      compared = Near();
     }
+    // If they are many, they may be of the device before or after a change.
+    if (!most_contradict || use.compared < kLeastToAgree) compared = Near();
     const SplitFindings found = Compare(compared);
     if (found.split.probability < kRareSplit) use.split = found.split;
     if (use.unused.empty() && Count() > 0) Add();

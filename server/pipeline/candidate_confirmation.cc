@@ -117,7 +117,7 @@ void CheckDisagreement(const CheckContext& context,
 void CheckRemembered(const CheckContext& context,
                      std::vector<ValidationCheck>* checks) {
   const RememberedUse& use = context.result.remembered;
-  if (use.compared == 0) return;
+  if (use.compared < context.limits.min_compared) return;
   const double limit = context.limits.max_contradicting;
   const double share = static_cast<double>(use.contradicting) / use.compared;
   std::string failure;

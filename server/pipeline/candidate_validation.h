@@ -72,8 +72,11 @@ struct CandidateLimits {
   // prior's. Chosen, not measured.
   double observed_below = 0.5;
   // If a larger share of the segments that are remembered contradicts the
-  // candidate, one of the two is wrong, or the device has changed.
+  // candidate, one of the two is wrong, or the device has changed. Fewer have
+  // no majority, as kLeastToAgree (core/calibration/segment_agreement.h)
+  // states.
   double max_contradicting = 0.5;
+  int min_compared = 4;
   // For effects that the rig does not estimate, and for the agreement of the
   // halves, of held-out segments with the candidate, and of the data with the
   // prior. Chosen, not measured: each of the tests
@@ -153,7 +156,7 @@ struct CandidateValidation {
 // - halves: calibrations on two halves of the segments agree;
 // - disagreement: each segment agrees with all others as far as noise allows;
 // - remembered: the segments without data do not contradict it by majority,
-//   nor all together. Not made if there are none near it;
+//   nor all together. Not made if there are too few near it;
 // - held_out_probability: the information of held-out segments is not too
 //   improbable under it (held_out.h), whichever one of them is left out;
 // - confirmed: halves or held_out_probability was tested.

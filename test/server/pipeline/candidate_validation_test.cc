@@ -388,6 +388,10 @@ TEST_F(CandidateTest, MostSegmentsWithoutDataMustAgree) {
   EXPECT_EQ(TheVerdict().kind, VerdictKind::kGood);
   result_.remembered.contradicting = 5;
   EXPECT_THAT(Problem("remembered"), HasSubstr("5 of 9"));
+  // One wrong segment is no majority.
+  result_.remembered.compared = 1;
+  result_.remembered.contradicting = 1;
+  EXPECT_THAT(Problems(), IsEmpty());
 }
 
 TEST_F(CandidateTest, SegmentsWithoutDataThatContradictItTogetherMakeItWeak) {
