@@ -126,9 +126,11 @@ absl::StatusOr<std::shared_ptr<void>> WatchChanges(
     to->set_what(v1::Change::EVERYTHING);
     return true;
   });
-  // Sent at once, so that the reader knows that its watch stands.
+  std::shared_ptr<void> subscription = context.feed->Subscribe(rig, put);
+  // Sent at once, so that the reader knows that its watch stands: what changes
+  // from now on is reported.
   put(v1::Change::EVERYTHING, "");
-  return context.feed->Subscribe(rig, put);
+  return subscription;
 }
 
 absl::StatusOr<v1::Caller> GetCaller(const ApiContext& context,
