@@ -323,7 +323,7 @@ std::string EffectOnActive(const CheckContext& context) {
   const double bias =
       worst->bias_sigmas *
       std::sqrt(context.result.covariance(i, i) / active.covariance(i, i));
-  if (!(bias > context.limits.max_bias_sigmas)) return "";
+  if (!(bias > context.limits.doubtful_bias_sigmas)) return "";
   return fmt::format(
       "Later segments show an effect that the rig does not estimate, most "
       "likely {}: it shifts {} by {:.1f} sigma of this version. Create a rig "

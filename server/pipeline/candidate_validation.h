@@ -161,9 +161,9 @@ struct CandidateValidation {
 //   improbable under it (held_out.h), whichever one of them is left out;
 // - confirmed: halves or held_out_probability was tested.
 //
-// If only `effects` fails, and the bias of that component is too large for the
-// sigma that it has in `active` too, this version must not be trusted either:
-// it was computed on segments that did not show the effect yet.
+// If only `effects` fails, and the bias of that component is above
+// doubtful_bias_sigmas in the sigmas of `active` too, this version must not be
+// trusted either: it was computed on segments that hardly showed the effect.
 CandidateValidation ValidateCandidate(const Rig& rig,
                                       const CalibrationResult& result,
                                       const CandidateEvidence& evidence,

@@ -216,7 +216,7 @@ TEST_F(CandidateTest, AnEffectAlsoShiftsTheActiveVersion) {
   // It is less certain, and the bias matters less for it.
   evidence_.active.covariance *= 4;
   EXPECT_THAT(Validate().of_active, HasSubstr("cam0.q_CI.x by 3.0 sigma"));
-  evidence_.active.covariance *= 4;
+  evidence_.active.covariance *= 10;
   EXPECT_EQ(Validate().of_active, "");
   // Segments that contradict each other may show effects that there are not.
   evidence_.active.covariance = result_.covariance;
