@@ -15,6 +15,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/component_settings.h"
 #include "client/cli/instruction.h"
+#include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/rig.grpc.pb.h"
 

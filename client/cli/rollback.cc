@@ -14,6 +14,7 @@
 #include "client/cli/bulk.h"
 #include "client/cli/commands.h"
 #include "client/cli/time_input.h"
+#include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 
