@@ -37,10 +37,18 @@ bool IsMade(const Context& context,
 
 }  // namespace
 
-void AddBulkFlags(CLI::App* command, BulkOptions* options) {
-  command->add_flag(
-      "--dry-run", options->dry_run, "Only show what would be changed");
-  command->add_flag("--yes", options->yes, "Do not ask for confirmation");
+CLI::Option* AddBulkOptions(CLI::App* command, BulkOptions* options) {
+  CLI::Option* const filter =
+      command->add_option("--filter",
+                          options->filter,
+                          "All rigs of it, e.g. 'labels.batch = \"2026-10\"'");
+  command
+      ->add_flag(
+          "--dry-run", options->dry_run, "Only show what would be changed")
+      ->needs(filter);
+  command->add_flag("--yes", options->yes, "Do not ask for confirmation")
+      ->needs(filter);
+  return filter;
 }
 
 grpc::Status ReadRigs(const Context& context,

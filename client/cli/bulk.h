@@ -21,10 +21,10 @@ struct BulkOptions {
   bool yes = false;
 };
 
-// --dry-run and --yes.
-void AddBulkFlags(CLI::App* command, BulkOptions* options);
+// --filter, and --dry-run and --yes, which need it. Returns the former.
+CLI::Option* AddBulkOptions(CLI::App* command, BulkOptions* options);
 
-// The rigs of the filter.
+// Reads the rigs of the filter.
 grpc::Status ReadRigs(const Context& context,
                       const std::string& filter,
                       std::vector<v1::Rig>* rigs);
@@ -32,12 +32,12 @@ grpc::Status ReadRigs(const Context& context,
 struct BulkChange {
   std::string rig;
   std::function<grpc::Status()> call;
-  // By which the device makes the call, if it reports the rig.
+  // The same call, for the device if it reports the rig.
   v1::Instruction instruction = {};
 };
 
-// How messages name a change: "Roll back 3 rigs at ...?", "tablet is not rolled
-// back: ...".
+// The words of messages about a change: "Roll back 3 rigs at ...?", "tablet is
+// not rolled back: ...".
 struct BulkWords {
   std::string imperative;  // "Roll back"
   std::string participle;  // "rolled back"

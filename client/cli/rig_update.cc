@@ -135,18 +135,6 @@ absl::Status ReadRequest(const UpdateOptions& options,
   return absl::OkStatus();
 }
 
-const FlagNames kFlags = {{"rig.name", "RIG"},
-                          {"rig.labels", "--label"},
-                          {"rig.prior_sigmas", "--prior-sigma"},
-                          {"rig.walk_densities", "--walk-density"},
-                          {"rig.min_gain_nats", "--min-gain"},
-                          {"rig.retrigger_fraction", "--retrigger-fraction"},
-                          {"rig.table_max_age", "--table-max-age"},
-                          {"rig.recalibration_min_interval", "--min-interval"},
-                          {"rig.calibration_max_age", "--calibration-max-age"},
-                          {"rig.imu.gyro_max", "--gyro-max"},
-                          {"rig.imu.accel_max", "--accel-max"}};
-
 int UpdateOne(Context* context, const UpdateOptions& options) {
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::GetRigRequest get;
@@ -157,7 +145,18 @@ int UpdateOne(Context* context, const UpdateOptions& options) {
   v1::UpdateRigRequest request;
   const absl::Status read = ReadRequest(options, rig, &request);
   if (!read.ok()) return FailInput(read);
-  context->flags.merge(FlagNames(kFlags));
+  context->flags.merge(
+      FlagNames{{"rig.name", "RIG"},
+                {"rig.labels", "--label"},
+                {"rig.prior_sigmas", "--prior-sigma"},
+                {"rig.walk_densities", "--walk-density"},
+                {"rig.min_gain_nats", "--min-gain"},
+                {"rig.retrigger_fraction", "--retrigger-fraction"},
+                {"rig.table_max_age", "--table-max-age"},
+                {"rig.recalibration_min_interval", "--min-interval"},
+                {"rig.calibration_max_age", "--calibration-max-age"},
+                {"rig.imu.gyro_max", "--gyro-max"},
+                {"rig.imu.accel_max", "--accel-max"}});
   status = Call<RigService>(stub.get(), &RigService::UpdateRig, request, &rig);
   v1::Instruction instruction;
   *instruction.mutable_update_rig() = request;
@@ -267,13 +266,7 @@ void AddRigUpdate(CLI::App* rig, Context* context) {
       "Change the labels, tolerances or thresholds of a rig, or of all rigs of "
       "a filter");
   CLI::Option* one = update->add_option("RIG", options->rig);
-  update
-      ->add_option("--filter",
-                   options->bulk.filter,
-                   "All rigs of it, e.g. 'labels.batch = \"2026-10\"', "
-                   "instead of RIG")
-      ->excludes(one);
-  AddBulkFlags(update, &options->bulk);
+  AddBulkOptions(update, &options->bulk)->excludes(one);
   update->add_option(
       "--label", options->labels, "NAME=VALUE: add or change; repeatable");
   update->add_option("--remove-label", options->removed_labels, "repeatable");

@@ -173,11 +173,7 @@ void AddCalibrationRollback(CLI::App* calibrations, Context* context) {
       "rollback",
       "Make the version before the active one active again, for all rigs of a "
       "filter");
-  rollback
-      ->add_option("--filter",
-                   options->bulk.filter,
-                   "Which rigs, e.g. 'labels.batch = \"2026-10\"'")
-      ->required();
+  AddBulkOptions(rollback, &options->bulk)->required();
   rollback
       ->add_option("--reason",
                    options->reason,
@@ -192,7 +188,6 @@ void AddCalibrationRollback(CLI::App* calibrations, Context* context) {
       options->again,
       "Also where a version was rolled back before, and no newer "
       "one has become active since");
-  AddBulkFlags(rollback, &options->bulk);
   rollback->callback([context, options] {
     context->command = [context, options] {
       return RollBack(context, *options);

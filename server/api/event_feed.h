@@ -47,7 +47,7 @@ class EventFeed final : public PipelineObserver {
   // Steady time, rig and number: identify an event.
   using EventId = std::tuple<std::int64_t, std::string, std::int64_t>;
   using EventIds = std::set<EventId>;
-  // When the rigs were last seen that were seen last.
+  // Times at which the rigs were last seen that were seen last.
   using Seen = std::map<std::string, std::int64_t>;
 
   struct Reader {
@@ -66,7 +66,8 @@ class EventFeed final : public PipelineObserver {
   // The readers that exist; with the lock held.
   std::vector<std::shared_ptr<Reader>> Readers();
   void Poll();
-  // Of the rig, or of all if it is empty; nullopt if it cannot be read now.
+  // Reads those of the rig, or of all if it is empty; nullopt if they cannot be
+  // read now.
   std::optional<Seen> ReadSeen(const std::string& rig);
   // `newest` are the newest events of the rig, or of all if it is empty.
   void NotifyOfEvents(const std::string& rig,

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/calibration/noise_scale.h"
+#include "core/calibration/segment_agreement.h"
 #include "server/pipeline/candidate_checks.h"
 
 namespace selfcal::server {
@@ -117,7 +118,7 @@ void CheckDisagreement(const CheckContext& context,
 void CheckRemembered(const CheckContext& context,
                      std::vector<ValidationCheck>* checks) {
   const RememberedUse& use = context.result.remembered;
-  if (use.compared < context.limits.min_compared) return;
+  if (use.compared < kLeastToAgree) return;  // they have no majority
   const double limit = context.limits.max_contradicting;
   const double share = static_cast<double>(use.contradicting) / use.compared;
   std::string failure;

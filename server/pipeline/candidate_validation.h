@@ -58,8 +58,9 @@ struct CandidateLimits {
   double max_imu_noise = 20;
   // An effect that the rig does not estimate may shift a component by this many
   // sigmas of the candidate, and by so many without making it weak: chosen on
-  // simulated devices, so that the shift and the noise together remain
-  // below 4.5 sigmas (./test/evaluate --only trust).
+  // simulated devices, so that the shift and the noise together remain below
+  // 4.5 sigmas (./test/evaluate --only trust), which is not reached for
+  // accelerometers whose axes lie apart (docs/evaluation.md).
   double max_bias_sigmas = 2;
   double doubtful_bias_sigmas = 1;
   // A component may lie this many prior sigmas from the factory's value.
@@ -71,12 +72,10 @@ struct CandidateLimits {
   // A component is treated as observed if its sigma is below this part of the
   // prior's. Chosen, not measured.
   double observed_below = 0.5;
-  // If a larger share of the segments that are remembered contradicts the
-  // candidate, one of the two is wrong, or the device has changed. Fewer have
-  // no majority, as kLeastToAgree (core/calibration/segment_agreement.h)
-  // states.
+  // If a larger share of the segments that are remembered, kLeastToAgree or
+  // more, contradicts the candidate, one of the two is wrong, or the device has
+  // changed.
   double max_contradicting = 0.5;
-  int min_compared = 4;
   // For effects that the rig does not estimate, and for the agreement of the
   // halves, of held-out segments with the candidate, and of the data with the
   // prior. Chosen, not measured: each of the tests

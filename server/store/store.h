@@ -191,9 +191,9 @@ struct StoredCalibration {
   std::optional<StoredValidation> validation;  // if it was validated
   Verdict verdict;                             // likewise
   double seconds = 0;                          // to compute it
-  // What was found after its validation, so that it must not be trusted: the
-  // two cores disagree on what it rests on, or later segments show an effect
-  // that shifts it. Empty: nothing.
+  // A finding after its validation, for which it must not be trusted: the two
+  // cores disagree on what it rests on, or later segments show an effect that
+  // shifts it. Empty: none.
   std::string finding;
   // The newest change of the device that its run does not account for; 0: none.
   std::int64_t changed_since = 0;

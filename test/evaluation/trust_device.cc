@@ -133,10 +133,13 @@ class Driver {
     NoteNews();
   }
 
-  // Of a recording that is too short to fill the tables.
+  // Calibrates a recording that is too short to fill the tables, unless nothing
+  // of it entered them.
   void RunByHand() {
     const auto begin = std::chrono::steady_clock::now();
-    Check(pipeline_->StartRecalibration(name_, true).status());
+    const auto run = pipeline_->StartRecalibration(name_, true).status();
+    if (absl::IsFailedPrecondition(run)) return;
+    Check(run);
     WaitUntilIdle();
     outcome_.pipeline_seconds +=
         Seconds(std::chrono::steady_clock::now() - begin);

@@ -104,6 +104,15 @@ TEST_F(RigUpdate, ChangesNothingIfItCannotBeReadForOneRig) {
   EXPECT_THAT(daemon_.updates, IsEmpty());
 }
 
+// A rig is changed at once.
+TEST_F(RigUpdate, HasNoDryRunOfOneRig) {
+  const Outcome outcome =
+      Selfcal({"rig", "update", "a", "--label", "a=b", "--dry-run"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--filter"));
+  EXPECT_THAT(daemon_.updates, IsEmpty());
+}
+
 TEST_F(RigUpdate, NeedsARigOrAFilterAndAChange) {
   EXPECT_EQ(Selfcal({"rig", "update", "--label", "a=b"}).code, 2);
   EXPECT_EQ(Selfcal({"rig", "update", "a"}).code, 2);

@@ -20,7 +20,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::Pair;
 
-// What a reader of the feed is told, but for events.
+// Collects what a reader of the feed is told, but for events.
 class Told {
  public:
   EventFeed::OnChange OnChange() {
