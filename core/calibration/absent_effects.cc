@@ -135,7 +135,10 @@ class EffectTests {
     const Eigen::VectorXd eta =
         sum_.eta(at) - coupling.transpose() * eliminate.solve(sum_.eta(theta_));
     const SymmetricEigen eigen(S);
-    Eigen::VectorXd estimate = Eigen::VectorXd::Zero(eta.size());
+    const Eigen::MatrixXd step = Sigma_ * coupling;  // of theta, by B
+    Eigen::VectorXd shift = Eigen::VectorXd::Zero(theta_.size());
+    Eigen::VectorXd variance = Eigen::VectorXd::Zero(theta_.size());
+    bool certain = false;
     AbsentEffect effect{block, {}, 0, ""};
     for (Eigen::Index j = 0; j < eta.size(); ++j) {
       const double information = eigen.eigenvalues()(j);
@@ -144,14 +147,18 @@ class EffectTests {
       const double square = std::pow(u.dot(eta), 2) / information;
       effect.test.statistic += square;
       ++effect.test.degrees;
-      if (square > kCertainSquare) estimate += u * u.dot(eta) / information;
+      certain = certain || square > kCertainSquare;
+      const Eigen::VectorXd along = step * u;
+      shift += along * u.dot(eta) / information;
+      variance += along.cwiseAbs2() / information;
     }
     if (effect.test.degrees == 0) return effect;
     effect.test.probability =
         ChiSquareTail(effect.test.statistic, effect.test.degrees);
-    const Eigen::VectorXd bias = Sigma_ * (coupling * estimate);
-    for (Eigen::Index k = 0; k < bias.size(); ++k) {
-      const double sigmas = std::abs(bias(k)) / std::sqrt(Sigma_(k, k));
+    if (!certain) return effect;
+    for (Eigen::Index k = 0; k < shift.size(); ++k) {
+      const double sigmas =
+          std::sqrt((shift(k) * shift(k) + variance(k)) / Sigma_(k, k));
       if (sigmas <= effect.bias_sigmas) continue;
       effect.bias_sigmas = sigmas;
       effect.component = names_[free_[theta_[k]]].name;

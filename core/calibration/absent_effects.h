@@ -7,10 +7,12 @@
 // The segments are linearised at theta, with the parameter blocks of all such
 // effects added at their value in the rig, or zero. For each block B, with the
 // rest of theta eliminated, the data gives S (B - B0) = eta with eta ~ N(0, S)
-// if the value is right (a score test). The bias that theta has in its place is
-// the step of theta that the estimate of B would cause, along those directions
-// of B in which it is certain, by the covariance of the calibration: what this
-// knows otherwise, from joined segments, is shifted less.
+// if the value is right (a score test). If a direction of B is certain, the bias
+// of theta is the step that the estimate of B would cause, by the covariance of
+// the calibration: what this knows otherwise, from joined segments, is shifted
+// less. The bias is a root mean square, with the uncertainty of that estimate,
+// and with the directions of B that are not certain: theta follows an effect
+// furthest where the motion shows it least.
 //
 // Pure, callable from any thread, deterministic.
 #pragma once
@@ -28,7 +30,8 @@ namespace selfcal {
 struct AbsentEffect {
   std::string block;     // "imu.accel.position", "cam0.time_offset"
   ConsistencyTest test;  // of the value that the rig has, or zero
-  // Largest bias of a free component of theta, in sigmas of the calibration.
+  // Largest bias of a free component of theta, in sigmas of the calibration; 0
+  // if no direction of the block is certain.
   double bias_sigmas = 0;
   std::string component;  // that one
 };

@@ -28,7 +28,8 @@ struct Device {
 // A hand-held device is calibrated as if its truth had no such effect.
 Device CalibrateDevice(const Change& effect,
                        std::uint64_t seed,
-                       const std::vector<BlockSetting>& blocks = {}) {
+                       const std::vector<BlockSetting>& blocks = {},
+                       double duration_s = 17) {
   Device device;
   Rig& rig = device.rig;
   rig = HandheldRig("effects");
@@ -45,7 +46,7 @@ Device CalibrateDevice(const Change& effect,
   device.segments = Simulate(rig,
                              truth,
                              rig.factory,
-                             *MakeHandheld(17, 1, seed),
+                             *MakeHandheld(duration_s, 1, seed),
                              "session",
                              options)
                         .segments;
@@ -160,6 +161,34 @@ TEST_P(EachEffect, IsFoundWithItsShiftWithinAFactorOfTwo) {
                 shift);
     EXPECT_GT(found.bias_sigmas, shift / 2);
     EXPECT_LT(found.bias_sigmas, 2 * shift + 0.5);
+  }
+}
+
+// Where the motion shows the effect least, it shifts the calibration furthest.
+TEST(AbsentEffects, AreNotTooSmallInFewSegments) {
+  const auto move_axes_apart = [](Calibration* truth) {
+    truth->imu.accel_position.resize(9);
+    truth->imu.accel_position << -0.01, 0.005, -0.005, 0.015, -0.01, 0, -0.005,
+        0.005, 0.005;
+  };
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const Device without = CalibrateDevice(NoEffect, seed, {}, 8);
+    const Device device = CalibrateDevice(move_axes_apart, seed, {}, 8);
+    const AbsentEffect found = MostLikely(EffectsOf(device));
+    EXPECT_EQ(found.block, "imu.accel.position");
+    const double shift =
+        BoxMinus(device.result.theta, without.result.theta)
+            .cwiseQuotient(
+                device.result.covariance.diagonal().cwiseSqrt().cwiseMax(
+                    1e-12))
+            .cwiseAbs()
+            .maxCoeff();
+    std::printf("%s %.2f sigma, shifted by at most %.2f\n",
+                found.component.c_str(),
+                found.bias_sigmas,
+                shift);
+    EXPECT_GT(found.bias_sigmas, shift / 2);
+    EXPECT_LT(found.bias_sigmas, 3 * shift);
   }
 }
 
