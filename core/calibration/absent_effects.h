@@ -7,12 +7,12 @@
 // The segments are linearised at theta, with the parameter blocks of all such
 // effects added at their value in the rig, or zero. For each block B, with the
 // rest of theta eliminated, the data gives S (B - B0) = eta with eta ~ N(0, S)
-// if the value is right (a score test). If a direction of B is certain, the bias
-// of theta is the step that the estimate of B would cause, by the covariance of
-// the calibration: what this knows otherwise, from joined segments, is shifted
-// less. The bias is a root mean square, with the uncertainty of that estimate,
-// and with the directions of B that are not certain: theta follows an effect
-// furthest where the motion shows it least.
+// if the value is right (a score test). If a direction of B is certain, the
+// bias of theta is the step that the estimate of B would cause, by the
+// covariance of the calibration: what this knows otherwise, from joined
+// segments, is shifted less. The bias is a root mean square, with the
+// uncertainty of that estimate, and with the directions of B that are not
+// certain: theta follows an effect furthest where the motion shows it least.
 //
 // Pure, callable from any thread, deterministic.
 #pragma once

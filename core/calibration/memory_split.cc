@@ -19,6 +19,9 @@ constexpr int kFewest = 2;        // segments on either side of a step
 constexpr int kShortestRamp = 3;  // parts
 // Fraction of a drift that is near enough to the present state of the device.
 constexpr double kDrifted = 2.0 / 3;
+// A drift explains a difference as well as a step if its test is less probable
+// than this multiple of that of the step.
+constexpr double kAsGood = 100;
 // A group is concerned if its test is less probable than this.
 constexpr double kConcerned = 0.01;
 // The prior probability that a device changed while its segments were recorded.
@@ -129,8 +132,7 @@ class SplitSearch {
     DeviceSplit& best = findings.split;
     const std::vector<Trial> trials = Trials(segments_, parts_);
     if (trials.empty() || onto_.rows() == 0) return findings;
-    const Trial* trial = nullptr;
-    const ThetaPart* theta_part = nullptr;
+    Tested step, drift;
     ChangeMixture mixture;
     const double others = AddContinuing(&mixture);
     for (const Trial& tried : trials) {
@@ -140,29 +142,52 @@ class SplitSearch {
         AddTo(&mixture, seen, one, others * share);
         const double probability =
             TestSpan(seen.change, one.basis).probability / share;
-        if (probability < best.probability) {
-          best.probability = probability;
-          trial = &tried;
-          theta_part = &one;
+        Tested& least = tried.kind == ChangeKind::kDrift ? drift : step;
+        if (probability < least.probability) {
+          least = {probability, &tried, &one};
         }
       }
     }
     findings.doubt = mixture.Doubt();
-    if (trial == nullptr) return findings;
-    best.kind = trial->kind;
-    best.block = theta_part->name;
-    const int first = FirstSince(trial->weights);
+    const Tested& found = IsDrift(step, drift) ? drift : step;
+    if (found.trial == nullptr) return findings;
+    best.probability = std::min(step.probability, drift.probability);
+    best.kind = found.trial->kind;
+    best.block = found.theta_part->name;
+    const int first = FirstSince(found.trial->weights);
     best.first = segments_[first].ends->key;
     best.newer = static_cast<int>(segments_.size()) - first;
     if (best.probability < kRareSplit) {
-      best.without_one = WithoutOne(*trial, *theta_part);
+      best.without_one = WithoutOne(found);
+      if (step.probability < found.probability) {
+        best.without_one = std::min(best.without_one, WithoutOne(step));
+      }
       best.concerned = ConcernedNames(FindConcerned(
-          GroupParts(rig_), Change(shown_, trial->weights), kConcerned));
+          GroupParts(rig_), Change(shown_, found.trial->weights), kConcerned));
     }
     return findings;
   }
 
  private:
+  // The least probable test of a kind of change; none has the probability 1.
+  struct Tested {
+    double probability = 1;
+    const Trial* trial = nullptr;
+    const ThetaPart* theta_part = nullptr;
+  };
+
+  // A step in the middle of a drift can by chance explain it as well, but would
+  // keep segments of which it is wrong, and not tell that the device may
+  // continue to change. If both explain the difference, it is a drift, unless
+  // that would keep segments from before the step.
+  bool IsDrift(const Tested& step, const Tested& drift) const {
+    if (drift.trial == nullptr) return false;
+    if (drift.probability < step.probability) return true;
+    return step.trial != nullptr &&
+           drift.probability < kAsGood * step.probability &&
+           FirstSince(drift.trial->weights) >= FirstSince(step.trial->weights);
+  }
+
   // Information about the free components in units of the prior, along the
   // directions.
   OffsetInformation InformationAboutOffset(
@@ -247,7 +272,9 @@ class SplitSearch {
     return parts_[part].first;
   }
 
-  double WithoutOne(const Trial& trial, const ThetaPart& theta_part) const {
+  double WithoutOne(const Tested& test) const {
+    const Trial& trial = *test.trial;
+    const ThetaPart& theta_part = *test.theta_part;
     double largest = 0;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       const auto part = segments_.subspan(parts_[i].first, parts_[i].count);

@@ -39,8 +39,9 @@ namespace selfcal {
 inline constexpr double kRareSplit = 0.05;
 
 struct SplitFindings {
-  // The least probable one. If its probability is not below kRareSplit,
-  // `without_one` is 1 and no group is concerned.
+  // The least probable one, or the drift of which a step was a part. If its
+  // probability is not below kRareSplit, `without_one` is 1 and no group is
+  // concerned.
   DeviceSplit split;
   // Possible change of theta of the newest segment, in tangent units (D);
   // nullopt if no course could be tested.

@@ -179,8 +179,7 @@ TEST(AbsentEffects, AreNotTooSmallInFewSegments) {
     const double shift =
         BoxMinus(device.result.theta, without.result.theta)
             .cwiseQuotient(
-                device.result.covariance.diagonal().cwiseSqrt().cwiseMax(
-                    1e-12))
+                device.result.covariance.diagonal().cwiseSqrt().cwiseMax(1e-12))
             .cwiseAbs()
             .maxCoeff();
     std::printf("%s %.2f sigma, shifted by at most %.2f\n",
