@@ -183,8 +183,7 @@ class SplitSearch {
   bool IsDrift(const Tested& step, const Tested& drift) const {
     if (drift.trial == nullptr) return false;
     if (drift.probability < step.probability) return true;
-    return step.trial != nullptr &&
-           drift.probability < kAsGood * step.probability &&
+    return drift.probability < kAsGood * step.probability &&
            FirstSince(drift.trial->weights) >= FirstSince(step.trial->weights);
   }
 

@@ -39,7 +39,8 @@ namespace selfcal {
 inline constexpr double kRareSplit = 0.05;
 
 struct SplitFindings {
-  // The least probable one, or the drift of which a step was a part. If its
+  // The least probable one, or a drift that explains it as well; its
+  // probability and `without_one` are then the least of both. If the
   // probability is not below kRareSplit, `without_one` is 1 and no group is
   // concerned.
   DeviceSplit split;

@@ -83,6 +83,12 @@ AbsentEffect MostLikely(const std::vector<AbsentEffect>& effects) {
 
 void NoEffect(Calibration*) {}
 
+void MoveAxesApart(Calibration* truth) {
+  truth->imu.accel_position.resize(9);
+  truth->imu.accel_position << -0.01, 0.005, -0.005, 0.015, -0.01, 0, -0.005,
+      0.005, 0.005;
+}
+
 TEST(AbsentEffects, WithoutAnyTheStatisticIsThatOfChance) {
   double statistic = 0;
   int degrees = 0;
@@ -164,16 +170,11 @@ TEST_P(EachEffect, IsFoundWithItsShiftWithinAFactorOfTwo) {
   }
 }
 
-// Where the motion shows the effect least, it shifts the calibration furthest.
+// An effect shifts a calibration furthest where the motion shows it least.
 TEST(AbsentEffects, AreNotTooSmallInFewSegments) {
-  const auto move_axes_apart = [](Calibration* truth) {
-    truth->imu.accel_position.resize(9);
-    truth->imu.accel_position << -0.01, 0.005, -0.005, 0.015, -0.01, 0, -0.005,
-        0.005, 0.005;
-  };
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Device without = CalibrateDevice(NoEffect, seed, {}, 8);
-    const Device device = CalibrateDevice(move_axes_apart, seed, {}, 8);
+    const Device device = CalibrateDevice(MoveAxesApart, seed, {}, 8);
     const AbsentEffect found = MostLikely(EffectsOf(device));
     EXPECT_EQ(found.block, "imu.accel.position");
     const double shift =
@@ -200,13 +201,7 @@ INSTANTIATE_TEST_SUITE_P(
                                  truth->imu.gyro_g_sensitivity << 5e-4, -3e-4,
                                      2e-4, 1e-4, -4e-4, 3e-4, -2e-4, 5e-4, 4e-4;
                                }},
-                    EffectCase{"imu.accel.position",
-                               [](Calibration* truth) {
-                                 truth->imu.accel_position.resize(9);
-                                 truth->imu.accel_position << -0.01, 0.005,
-                                     -0.005, 0.015, -0.01, 0, -0.005, 0.005,
-                                     0.005;
-                               }},
+                    EffectCase{"imu.accel.position", MoveAxesApart},
                     EffectCase{"cam0.time_offset",
                                [](Calibration* truth) {
                                  truth->cameras[0].time_offset_s = 5e-4;

@@ -76,7 +76,7 @@ TEST_F(MemorySplitTest, ARotatedCameraIsDetectedAndNamed) {
   EXPECT_LT(split.without_one, 1e-4);
 }
 
-// By a step in one of four sessions it is explained nearly as well.
+// A step before one of the four sessions explains it nearly as well.
 TEST_F(MemorySplitTest, ADriftIsNotTakenForAStep) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     ends_.clear();
