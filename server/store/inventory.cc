@@ -57,7 +57,7 @@ absl::Status ApplyInventory(UnitOfWork* tx,
     }
     const bool present = range < record.rows_size() &&
                          record.rows(range).values(0).integer() <= sequence;
-    if (!present) SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, sequence));
+    if (!present) SELFCAL_RETURN_IF_ERROR(DeleteSegmentAlone(tx, sequence));
   }
   return absl::OkStatus();
 }

@@ -143,14 +143,14 @@ absl::Status DeleteOther(UnitOfWork* tx,
               key.session,
               key.index,
               number));
-  return other == 0 ? absl::OkStatus() : DeleteSegment(tx, other);
+  return other == 0 ? absl::OkStatus() : DeleteSegmentAlone(tx, other);
 }
 
 absl::Status ApplySegment(UnitOfWork* tx,
                           const Record& record,
                           const Rows& rows) {
   const ReportedRow* row = RowOf(rows, "segments");
-  if (row == nullptr) return DeleteSegment(tx, record.number());
+  if (row == nullptr) return DeleteSegmentAlone(tx, record.number());
   const SegmentKey key{row->Of("session").text(),
                        row->Of("session_index").integer()};
   Statement before(tx->db(),
@@ -162,7 +162,7 @@ absl::Status ApplySegment(UnitOfWork* tx,
       before.Next() && SegmentKey{before.Text(0), before.Int(1)} != key;
   SELFCAL_RETURN_IF_ERROR(before.status());
   // The last segment was deleted, and another one took its number.
-  if (another) SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, record.number()));
+  if (another) SELFCAL_RETURN_IF_ERROR(DeleteSegmentAlone(tx, record.number()));
   SELFCAL_RETURN_IF_ERROR(DeleteOther(tx, key, record.number()));
   SELFCAL_RETURN_IF_ERROR(ReplaceRows(tx, record, rows));
   SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),

@@ -319,18 +319,25 @@ absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t sequence) {
 }
 
 absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t sequence) {
-  tx->Changed(RecordKind::kSegment, sequence);
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestSequence(tx));
   if (sequence == newest) {
-    // The next segment to arrive takes its number.
+    // The next segments to arrive take its number, and those of the segments
+    // that were deleted just before it in the order of arrival.
     Statement forget(tx->db(),
                      "UPDATE table_absences SET rival = NULL "
-                     "WHERE rig = ?1 AND rival = ?2 RETURNING sequence",
+                     "WHERE rig = ?1 AND rival > (SELECT "
+                     "  coalesce(max(sequence), 0) FROM segments "
+                     "  WHERE rig = ?1 AND sequence < ?2) RETURNING sequence",
                      tx->rig_row(),
                      sequence);
     while (forget.Next()) tx->Changed(RecordKind::kSegment, forget.Int(0));
     SELFCAL_RETURN_IF_ERROR(forget.status());
   }
+  return DeleteSegmentAlone(tx, sequence);
+}
+
+absl::Status DeleteSegmentAlone(UnitOfWork* tx, std::int64_t sequence) {
+  tx->Changed(RecordKind::kSegment, sequence);
   Statement runs(tx->db(),
                  "SELECT run FROM run_segments "
                  "WHERE rig = ?1 AND sequence = ?2",

@@ -95,6 +95,7 @@ class DaemonTest : public ::testing::Test {
     grpc::ClientContext context;
     v1::ListSegmentsRequest request;
     request.set_parent("rigs/r");
+    request.set_page_size(1000);
     v1::ListSegmentsResponse response;
     const auto stub = v1::SegmentService::NewStub(channel_);
     EXPECT_TRUE(stub->ListSegments(&context, request, &response).ok());

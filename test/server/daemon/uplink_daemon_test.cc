@@ -73,6 +73,7 @@ class UplinkDaemonTest : public DaemonTest {
       grpc::ClientContext context;
       v1::ListCalibrationsRequest request;
       request.set_parent("rigs/r");
+      request.set_page_size(1000);
       v1::ListCalibrationsResponse response;
       add(v1::CalibrationService::NewStub(channel)->ListCalibrations(
               &context, request, &response),

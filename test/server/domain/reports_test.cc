@@ -397,6 +397,29 @@ TEST_P(ReportsTest, NumberOfADeletedSegmentMayBeTakenByAnother) {
   ExpectSame("a", true);
 }
 
+// The newest segment of the hub need not be that of the device.
+TEST_P(ReportsTest, RivalThatIsDeletedIsTheSameAtTheHub) {
+  const Rig rig = CreateDeviceRig("a");
+  const int rival = rig.table_size;
+  for (int k = 0; k <= rival; ++k) {
+    PutOnDevice(rig, k);
+    ScoreOnDevice(rig, k, -k);
+  }
+  ReportAll();
+  const auto exclusions = store_->ListExclusions("a", {"s", 0});
+  ASSERT_TRUE(exclusions.ok()) << exclusions.status();
+  ASSERT_FALSE(exclusions->empty());
+  EXPECT_EQ(exclusions->front().rival, (SegmentKey{"s", rival}));
+  // It is reported in the place of the first change, before the next one.
+  ASSERT_TRUE(
+      device_domain_->QuarantineSegments("a", "s", rival, "eve", "x").ok());
+  PutOnDevice(rig, rival + 1);
+  ASSERT_TRUE(
+      device_domain_->DeleteSegment("a", {"s", rival}, "eve", "private").ok());
+  ReportAll();
+  ExpectSame("a");
+}
+
 TEST_P(ReportsTest, NewestSegmentsMayComeAgainInAnotherOrder) {
   for (const bool anew : {false, true}) {
     const std::string id = anew ? "a" : "b";

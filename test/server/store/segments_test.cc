@@ -141,6 +141,30 @@ TEST_P(SegmentsTest, ARivalThatIsDeletedIsNotMistakenForTheNextSegment) {
   EXPECT_FALSE(after->front().rival);
 }
 
+// Both numbers are taken again, though only one was the newest's.
+TEST_P(SegmentsTest, ARivalThatIsDeletedBeforeTheNewestIsForgottenWithIt) {
+  Rig rig = TestRig("a");
+  rig.table_size = 1;
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  for (const std::int64_t index : {0, 1}) {
+    Put("a", index);
+    Score(rig, index, -10.0 * static_cast<double>(index));
+  }
+  Put("a", 2);
+  const auto before = store_->ListExclusions("a", {"s", 0});
+  ASSERT_TRUE(before.ok() && !before->empty()) << before.status();
+  EXPECT_EQ(before->front().rival, (SegmentKey{"s", 1}));
+  for (const std::int64_t index : {1, 2}) {
+    ASSERT_TRUE(
+        domain_->DeleteSegment("a", {"s", index}, "eve", "private").ok());
+  }
+  Put("a", 3);
+  EXPECT_EQ(store_->GetSegment("a", {"s", 3})->sequence, 2);
+  const auto after = store_->ListExclusions("a", {"s", 0});
+  ASSERT_TRUE(after.ok() && !after->empty()) << after.status();
+  EXPECT_FALSE(after->front().rival);
+}
+
 TEST_P(SegmentsTest, PagesShowEverySegmentOnceNewestFirst) {
   CreateTestRig("a");
   for (int k = 0; k < 7; ++k) Put("a", k);
