@@ -221,6 +221,23 @@ absl::StatusOr<Calibration> ToCalibration(const selfcal_imu* imu,
   return theta;
 }
 
+std::int32_t ToVerdict(client::CalibrationVersion::Verdict verdict) {
+  using Verdict = client::CalibrationVersion::Verdict;
+  switch (verdict) {
+    case Verdict::kGood:
+      return SELFCAL_VERDICT_GOOD;
+    case Verdict::kWeak:
+      return SELFCAL_VERDICT_WEAK;
+    case Verdict::kNotTrustworthy:
+      return SELFCAL_VERDICT_NOT_TRUSTWORTHY;
+    case Verdict::kFactory:
+      return SELFCAL_VERDICT_FACTORY;
+    case Verdict::kUnknown:
+      break;
+  }
+  return SELFCAL_VERDICT_UNKNOWN;
+}
+
 selfcal_component ToComponent(const PublishedVersion& published,
                               std::int32_t index) {
   const TangentComponent& given =
@@ -314,6 +331,30 @@ void selfcal_calibration_destroy(selfcal_calibration* calibration) {
 
 int64_t selfcal_calibration_version(const selfcal_calibration* calibration) {
   return calibration == nullptr ? 0 : calibration->published->version.version;
+}
+
+int32_t selfcal_calibration_get_verdict(
+    const selfcal_calibration* calibration) {
+  return calibration == nullptr
+             ? SELFCAL_VERDICT_UNKNOWN
+             : selfcal::c::ToVerdict(calibration->published->version.verdict);
+}
+
+int32_t selfcal_calibration_reason_count(
+    const selfcal_calibration* calibration) {
+  return calibration == nullptr
+             ? 0
+             : static_cast<int32_t>(
+                   calibration->published->version.reasons.size());
+}
+
+const char* selfcal_calibration_reason(const selfcal_calibration* calibration,
+                                       int32_t index) {
+  if (index < 0 || index >= selfcal_calibration_reason_count(calibration)) {
+    return nullptr;
+  }
+  const auto at = static_cast<std::size_t>(index);
+  return calibration->published->version.reasons[at].c_str();
 }
 
 int32_t selfcal_calibration_camera_count(

@@ -116,7 +116,8 @@ typedef struct selfcal_observation {
   double p_G[3];
 } selfcal_observation;
 
-// One version of a rig's calibration. It never changes.
+// One version of a rig's calibration, with the verdict on it at the time. It
+// never changes.
 typedef struct selfcal_calibration selfcal_calibration;
 
 // ------------------------------------------------------------------- Builder
@@ -539,6 +540,28 @@ void selfcal_calibration_destroy(selfcal_calibration* calibration);
 // Number of the version, from 1 (the factory calibration); 0 for NULL, and for
 // a calibration that was made from values.
 int64_t selfcal_calibration_version(const selfcal_calibration* calibration);
+
+// The conclusion of the daemon's checks.
+enum selfcal_calibration_verdict {
+  SELFCAL_VERDICT_UNKNOWN = 0,  // none, or one that this library does not know
+  SELFCAL_VERDICT_GOOD = 1,
+  SELFCAL_VERDICT_WEAK = 2,  // right, but some directions are hardly known
+  // The device has changed since, e.g. by a shock, or a later check contradicts
+  // the version: the covariance says nothing about its error.
+  SELFCAL_VERDICT_NOT_TRUSTWORTHY = 3,
+  SELFCAL_VERDICT_FACTORY = 4  // nothing was estimated
+};
+// A selfcal_calibration_verdict; SELFCAL_VERDICT_UNKNOWN for NULL, and for a
+// calibration that was made from values.
+int32_t selfcal_calibration_get_verdict(const selfcal_calibration* calibration);
+// Number of reasons for the verdict; 0 for NULL.
+int32_t selfcal_calibration_reason_count(
+    const selfcal_calibration* calibration);
+// One of them, a sentence that is valid as long as the calibration; NULL for
+// NULL, and if there is no such reason.
+const char* selfcal_calibration_reason(const selfcal_calibration* calibration,
+                                       int32_t index);
+
 // 0 for NULL.
 int32_t selfcal_calibration_camera_count(
     const selfcal_calibration* calibration);
@@ -636,8 +659,9 @@ typedef void (*selfcal_calibration_callback)(
     const selfcal_calibration* calibration, void* user);
 
 // Creates a watch, which calls back with the active version as soon as the
-// daemon answers, and with each version that becomes active later. A slow
-// callback gets the newest version; no version is delivered twice in a row.
+// daemon answers, with each version that becomes active later, and again with
+// the active one when its verdict changes. A slow callback gets the newest
+// version; none is delivered twice in a row with the same verdict.
 // `on_new` may be NULL, for selfcal_watch_newest; `user` is passed to it.
 int32_t selfcal_watch_create(const selfcal_client_options* options,
                              selfcal_calibration_callback on_new,

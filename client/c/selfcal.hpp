@@ -160,6 +160,18 @@ class Calibration {
   std::int64_t version() const {
     return selfcal_calibration_version(handle_.get());
   }
+  // A selfcal_calibration_verdict, and the reasons for it.
+  std::int32_t verdict() const {
+    return selfcal_calibration_get_verdict(handle_.get());
+  }
+  std::vector<std::string> reasons() const {
+    std::vector<std::string> reasons;
+    const std::int32_t count = selfcal_calibration_reason_count(handle_.get());
+    for (std::int32_t i = 0; i < count; ++i) {
+      reasons.emplace_back(selfcal_calibration_reason(handle_.get(), i));
+    }
+    return reasons;
+  }
   std::int32_t camera_count() const {
     return selfcal_calibration_camera_count(handle_.get());
   }

@@ -15,6 +15,22 @@ absl::Status Broken(const Violation& violation) {
       fmt::format("{}: {}", violation.field, violation.message));
 }
 
+CalibrationVersion::Verdict ToVerdict(v1::Verdict::Kind kind) {
+  using Verdict = CalibrationVersion::Verdict;
+  switch (kind) {
+    case v1::Verdict::GOOD:
+      return Verdict::kGood;
+    case v1::Verdict::WEAK:
+      return Verdict::kWeak;
+    case v1::Verdict::NOT_TRUSTWORTHY:
+      return Verdict::kNotTrustworthy;
+    case v1::Verdict::FACTORY:
+      return Verdict::kFactory;
+    default:
+      return Verdict::kUnknown;
+  }
+}
+
 }  // namespace
 
 CalibrationVersion AtTemperature(const CalibrationVersion& version,
@@ -32,6 +48,9 @@ absl::StatusOr<CalibrationVersion> ToCalibrationVersion(
     const v1::Calibration& message) {
   CalibrationVersion value;
   value.version = message.version();
+  value.verdict = ToVerdict(message.verdict().kind());
+  value.reasons.assign(message.verdict().sentences().begin(),
+                       message.verdict().sentences().end());
   std::vector<Violation> violations =
       FromProto(message.parameters(), "parameters.", &value.theta);
   if (violations.empty()) violations = Validate(value.theta, "parameters");

@@ -44,6 +44,8 @@ class CalibrationWatch::Impl {
   }
 
  private:
+  using Published = std::pair<std::int64_t, CalibrationVersion::Verdict>;
+
   void Run() {
     Backoff backoff(
         options_.min_backoff, options_.max_backoff, JitterSeed(this));
@@ -101,8 +103,10 @@ class CalibrationWatch::Impl {
       std::lock_guard lock(mutex_);
       connection_ = version.status();
     }
-    if (!version.ok() || last_published_ == version->version) return;
-    last_published_ = version->version;
+    if (!version.ok()) return;
+    const Published published = {version->version, version->verdict};
+    if (last_published_ == published) return;
+    last_published_ = published;
     if (!callback_) return;
     try {
       callback_(*version);
@@ -114,7 +118,7 @@ class CalibrationWatch::Impl {
 
   const ClientOptions options_;
   const Callback callback_;
-  std::optional<std::int64_t> last_published_;  // used by thread_ only
+  std::optional<Published> last_published_;  // used by thread_ only
 
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable stopped_;

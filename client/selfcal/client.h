@@ -141,10 +141,22 @@ class SegmentStream {
 
 // One version of a rig's calibration, as published.
 struct CalibrationVersion {
+  // The conclusion of the daemon's checks. An active version ceases to be
+  // trustworthy if the device has changed since, e.g. by a shock, or if a later
+  // check contradicts it: the uncertainty then says nothing about its error.
+  enum class Verdict {
+    kUnknown,  // none, or one that this program does not know
+    kGood,
+    kWeak,  // right, but some directions are hardly known
+    kNotTrustworthy,
+    kFactory,  // the rig was created with it; nothing was estimated
+  };
   std::int64_t version = 0;
   Calibration theta;
   // Covariance of the tangent components, D x D; 0 x 0 if it is not known.
   Eigen::MatrixXd covariance;
+  Verdict verdict = Verdict::kUnknown;
+  std::vector<std::string> reasons;  // for the verdict, a sentence each
 };
 
 // A version at a temperature [deg C]: without slopes, with the covariance of
@@ -154,9 +166,10 @@ CalibrationVersion AtTemperature(const CalibrationVersion& version,
                                  double temperature_c);
 
 // Watches the active calibration of a rig. Calls back with the active version
-// at once, and with each version that becomes active later. Reconnects when the
-// daemon restarts, and waits for a rig that does not exist yet. A slow callback
-// gets the newest version; no version is delivered twice in a row.
+// at once, with each version that becomes active later, and again with the
+// active one when its verdict changes. Reconnects when the daemon restarts, and
+// waits for a rig that does not exist yet. A slow callback gets the newest
+// version; none is delivered twice in a row with the same verdict.
 class CalibrationWatch {
  public:
   using Callback = std::function<void(const CalibrationVersion&)>;

@@ -10,7 +10,7 @@ void AnnouncementRelay::Start() {
 void AnnouncementRelay::Act(const Announcement& announcement) {
   switch (announcement.kind) {
     case Announcement::Kind::kCalibration:
-      OnCalibration(announcement.rig);
+      PassOnActive(announcement.rig);
       break;
     case Announcement::Kind::kRun:
       OnRun(announcement.rig, announcement.run);
@@ -21,7 +21,7 @@ void AnnouncementRelay::Act(const Announcement& announcement) {
     case Announcement::Kind::kMissed:
       OnDeletion("");
       for (const auto& rig : calibration_watchers_->Topics()) {
-        OnCalibration(rig);
+        PassOnActive(rig);
       }
       for (const auto& [rig, run] : run_watchers_->Topics()) OnRun(rig, run);
       break;
@@ -30,7 +30,7 @@ void AnnouncementRelay::Act(const Announcement& announcement) {
 
 void AnnouncementRelay::PassOnRig(const std::string& rig) {
   OnDeletion(rig);
-  OnCalibration(rig);
+  PassOnActive(rig);
   for (const auto& [of, run] : run_watchers_->Topics()) {
     if (of == rig) OnRun(rig, run);
   }
@@ -48,7 +48,7 @@ void AnnouncementRelay::OnDeletion(const std::string& rig) {
 // Should the store fail in one of the following, the listener reports soon that
 // announcements may have been missed.
 
-void AnnouncementRelay::OnCalibration(const std::string& rig) {
+void AnnouncementRelay::PassOnActive(const std::string& rig) {
   if (!calibration_watchers_->IsWatched(rig)) return;
   auto active = store_->GetActiveCalibration(rig);
   if (active.ok()) calibration_watchers_->PassOn(*std::move(active));

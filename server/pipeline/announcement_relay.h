@@ -45,12 +45,14 @@ class AnnouncementRelay {
 
   // Passes on what a device has reported of its rig.
   void PassOnRig(const std::string& rig);
+  // Passes on the active version of the rig, if it is another one or has
+  // another verdict.
+  void PassOnActive(const std::string& rig);
 
  private:
   void Act(const Announcement& announcement);
   // An empty name: of any rig.
   void OnDeletion(const std::string& rig);
-  void OnCalibration(const std::string& rig);
   void OnRun(const std::string& rig, std::int64_t number);
 
   Store* const store_;

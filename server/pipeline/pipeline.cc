@@ -117,7 +117,10 @@ class PipelineImpl : public Pipeline {
         options_(options),
         estimators_(estimators),
         coach_(store_),
-        verifier_(domain, options, estimators),
+        verifier_(domain,
+                  options,
+                  estimators,
+                  [this](const std::string& rig) { relay_.PassOnActive(rig); }),
         sampler_(store_, options, &verifier_),
         run_watchers_(ObserveRuns(options.observer, &sampler_)),
         claims_(store_,
@@ -142,6 +145,7 @@ class PipelineImpl : public Pipeline {
               spdlog::info("run {} of rig {} is due", run.run, run.rig);
               recalibrator_.Wake();
             },
+            [this](const std::string& rig) { relay_.PassOnActive(rig); },
             [this](const std::string& rig) { recalibrator_.NoteScore(rig); }),
         relay_(store_,
                &claims_,

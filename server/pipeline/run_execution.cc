@@ -136,6 +136,11 @@ absl::Status EndWith(const RunContext& context,
                  stored.version,
                  stored.rig,
                  fmt::join(stored.reasons, " "));
+    // The run may have found that the version that stays active is not to be
+    // trusted.
+    SELFCAL_ASSIGN_OR_RETURN(StoredCalibration active,
+                             context.store()->GetActiveCalibration(run.rig));
+    calibration_watchers->Publish(std::move(active));
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun ended,
                            context.store()->GetRun(run.rig, run.run));

@@ -27,18 +27,21 @@ bool IsFinite(const Score& score) {
 
 }  // namespace
 
-ScoringWorkers::ScoringWorkers(Domain* domain,
-                               RigClaims* claims,
-                               const PipelineOptions& options,
-                               Estimators estimators,
-                               std::function<void(const StoredRun&)> on_run,
-                               std::function<void(const std::string&)> on_done)
+ScoringWorkers::ScoringWorkers(
+    Domain* domain,
+    RigClaims* claims,
+    const PipelineOptions& options,
+    Estimators estimators,
+    std::function<void(const StoredRun&)> on_run,
+    std::function<void(const std::string&)> on_change,
+    std::function<void(const std::string&)> on_done)
     : domain_(domain),
       store_(domain->store()),
       claims_(claims),
       options_(options),
       estimators_(std::move(estimators)),
       on_run_(std::move(on_run)),
+      on_change_(std::move(on_change)),
       on_done_(std::move(on_done)),
       backlog_(options.max_backlog) {}
 
@@ -324,6 +327,7 @@ absl::Status ScoringWorkers::TryCommit(const Claim& claim, const Score& score) {
                  claim.rig,
                  fmt::join(commit.change->groups, ", "),
                  commit.change->first_sequence);
+    on_change_(claim.rig);
   }
   if (commit.started_run) {
     on_run_(*commit.started_run);

@@ -38,13 +38,15 @@ namespace selfcal::server {
 class ScoringWorkers {
  public:
   // Scores the segments of the rigs of `claims`. `on_run` is called on a worker
-  // for each run that a commit creates, `on_done` with the rig of each segment
-  // that a worker is done with.
+  // for each run that a commit creates, `on_change` with the rig of each change
+  // of a device that one finds, `on_done` with the rig of each segment that a
+  // worker is done with.
   ScoringWorkers(Domain* domain,
                  RigClaims* claims,
                  const PipelineOptions& options,
                  Estimators estimators,
                  std::function<void(const StoredRun&)> on_run,
+                 std::function<void(const std::string&)> on_change,
                  std::function<void(const std::string&)> on_done);
   ~ScoringWorkers();
 
@@ -117,6 +119,7 @@ class ScoringWorkers {
   const PipelineOptions options_;
   const Estimators estimators_;
   const std::function<void(const StoredRun&)> on_run_;
+  const std::function<void(const std::string&)> on_change_;
   const std::function<void(const std::string&)> on_done_;
 
   Backlog backlog_;

@@ -254,7 +254,10 @@ absl::Status Verifier::Conclude(const std::string& rig,
   const std::string finding = DisagreementText(verification);
   if (finding.empty()) return absl::OkStatus();
   spdlog::error("rig {}, version {}: {}", rig, verification.version, finding);
-  return domain_->ReportDisagreement(rig, verification.version, finding);
+  SELFCAL_RETURN_IF_ERROR(
+      domain_->ReportDisagreement(rig, verification.version, finding));
+  on_finding_(rig);
+  return absl::OkStatus();
 }
 
 }  // namespace selfcal::server

@@ -14,6 +14,7 @@
 #include <functional>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/domain/domain.h"
@@ -25,14 +26,17 @@ namespace selfcal::server {
 
 class Verifier {
  public:
-  // `domain` must outlive it.
+  // `domain` must outlive it. `on_finding` is called with the rig of each
+  // finding that was recorded.
   Verifier(Domain* domain,
            const PipelineOptions& options,
-           const Estimators& estimators)
+           const Estimators& estimators,
+           std::function<void(const std::string&)> on_finding)
       : domain_(domain),
         store_(domain->store()),
         options_(options),
-        estimators_(estimators) {}
+        estimators_(estimators),
+        on_finding_(std::move(on_finding)) {}
 
   // Makes every call return soon, with CANCELLED, from now on.
   void Stop() { stopped_ = true; }
@@ -84,6 +88,7 @@ class Verifier {
   Store* const store_;
   const PipelineOptions options_;
   const Estimators estimators_;
+  const std::function<void(const std::string&)> on_finding_;
   std::atomic<bool> stopped_ = false;
   std::mutex mutex_;  // held by VerifyRig
 };

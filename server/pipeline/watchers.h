@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "server/pipeline/pipeline.h"
+#include "server/pipeline/verdict.h"
 
 namespace selfcal::server {
 
@@ -27,9 +28,10 @@ namespace selfcal::server {
 struct LastActivation {
   std::int64_t rig_key = 0;
   std::int64_t activation = 0;
+  VerdictKind verdict = VerdictKind::kUnknown;
 };
 inline LastActivation Remembered(const StoredCalibration& update) {
-  return {update.rig_key, update.activation};
+  return {update.rig_key, update.activation, VerdictOf(update).kind};
 }
 struct LastRunUpdate {
   RunState state = RunState::kPending;
@@ -38,12 +40,18 @@ inline LastRunUpdate Remembered(const RunUpdate& update) {
   return {update.run.state};
 }
 
-// Each activation of a rig once, in order. The newest one need not have the
-// highest version: an older version may have been activated again. A rig that
-// was deleted and created again is another one, which the watcher may not have
-// the right to see.
+// Each activation of a rig once, in order, and once more if its version ceases
+// to be trustworthy while it is active; that is not taken back. The newest one
+// need not have the highest version: an older version may have been activated
+// again. A rig that was deleted and created again is another one, which the
+// watcher may not have the right to see.
 inline bool Follows(const LastActivation& last, const StoredCalibration& next) {
-  return next.rig_key == last.rig_key && next.activation > last.activation;
+  if (next.rig_key != last.rig_key) return false;
+  if (next.activation != last.activation) {
+    return next.activation > last.activation;
+  }
+  return last.verdict != VerdictKind::kNotTrustworthy &&
+         VerdictOf(next).kind == VerdictKind::kNotTrustworthy;
 }
 
 // No update after the end of a run.

@@ -17,7 +17,7 @@ namespace selfcal::server {
 
 struct Announcement {
   enum class Kind {
-    kCalibration,  // another version of the rig is active
+    kCalibration,  // the active version of the rig, or its verdict, is another
     kRun,          // a run was created, or its state has changed
     kDeletion,     // the rig was deleted
     kMissed,       // some announcements may have been missed

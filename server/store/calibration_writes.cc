@@ -102,14 +102,16 @@ absl::Status InsertFinding(UnitOfWork* tx,
                            std::int64_t version,
                            const std::string& finding) {
   tx->Changed(RecordKind::kCalibration, version);
-  return Statement(tx->db(),
-                   "INSERT INTO disagreements (rig, version, time_ns, finding) "
-                   "VALUES (?1, ?2, ?3, ?4) ON CONFLICT DO NOTHING",
-                   tx->rig_row(),
-                   version,
-                   tx->time_ns(),
-                   finding)
-      .Run();
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(tx->db(),
+                "INSERT INTO disagreements (rig, version, time_ns, finding) "
+                "VALUES (?1, ?2, ?3, ?4) ON CONFLICT DO NOTHING",
+                tx->rig_row(),
+                version,
+                tx->time_ns(),
+                finding)
+          .Run());
+  return AnnounceCalibration(tx);
 }
 
 }  // namespace selfcal::server

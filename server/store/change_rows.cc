@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "server/status/status_macros.h"
+#include "server/store/announcements.h"
 #include "server/store/driver/statement.h"
 #include "server/store/rigs.h"
 
@@ -80,7 +81,7 @@ absl::Status InsertChange(UnitOfWork* tx, const StoredChange& change) {
                                       group)
                                 .Run());
   }
-  return absl::OkStatus();
+  return AnnounceCalibration(tx);  // its verdict may be another now
 }
 
 }  // namespace selfcal::server

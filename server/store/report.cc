@@ -250,6 +250,9 @@ absl::Status ApplyCalibration(UnitOfWork* tx,
       continue;
     }
     SELFCAL_RETURN_IF_ERROR(WriteRow(tx, more, version, OnConflict::kKeep));
+    if (more.table->name == "disagreements") {
+      SELFCAL_RETURN_IF_ERROR(AnnounceCalibration(tx));
+    }
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration written,
                            ReadCalibration(tx, version));
@@ -355,7 +358,8 @@ absl::Status ApplyRecord(UnitOfWork* tx,
     case RecordKind::kChange: {
       if (rows.empty()) return BadReport("a device change is gone");
       SELFCAL_RETURN_IF_ERROR(ReplaceRows(tx, record, rows));
-      return ReadChange(tx, record.number()).status();
+      SELFCAL_RETURN_IF_ERROR(ReadChange(tx, record.number()).status());
+      return AnnounceCalibration(tx);
     }
     case RecordKind::kEvent:
       return ApplyEvent(tx, record, rows);

@@ -177,7 +177,10 @@ class Daemon:
     def watch_calibration(
         self, rig_id: str
     ) -> Iterator[calibration.Calibration]:
-        """Yields the active version at once, then each new one."""
+        """Yields the active version at once, then each new one.
+
+        Yields the active one again if it ceases to be trustworthy.
+        """
         return self.calibration_service.WatchCalibration(
             calibration.WatchCalibrationRequest(parent=f"rigs/{rig_id}")
         )

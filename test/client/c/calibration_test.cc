@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/c/selfcal.h"
@@ -474,11 +475,47 @@ TEST_F(CalibrationTest, ACopyOutlivesTheWatch) {
   selfcal_calibration_destroy(copy);
 }
 
+TEST_F(CalibrationTest, HasTheVerdictOnIt) {
+  const std::pair<v1::Verdict::Kind, std::int32_t> kinds[] = {
+      {v1::Verdict::GOOD, SELFCAL_VERDICT_GOOD},
+      {v1::Verdict::WEAK, SELFCAL_VERDICT_WEAK},
+      {v1::Verdict::NOT_TRUSTWORTHY, SELFCAL_VERDICT_NOT_TRUSTWORTHY},
+      {v1::Verdict::FACTORY, SELFCAL_VERDICT_FACTORY},
+      {v1::Verdict::UNKNOWN, SELFCAL_VERDICT_UNKNOWN},
+      {static_cast<v1::Verdict::Kind>(77), SELFCAL_VERDICT_UNKNOWN}};
+  for (const auto& [kind, expected] : kinds) {
+    v1::Calibration message = Message(7, false);
+    message.mutable_verdict()->set_kind(kind);
+    for (const char* reason : {"One.", "Two."}) {
+      message.mutable_verdict()->add_sentences(reason);
+    }
+    Receive(message);
+    EXPECT_EQ(selfcal_calibration_get_verdict(calibration_), expected);
+    ASSERT_EQ(selfcal_calibration_reason_count(calibration_), 2);
+    EXPECT_STREQ(selfcal_calibration_reason(calibration_, 1), "Two.");
+    EXPECT_EQ(selfcal_calibration_reason(calibration_, 2), nullptr);
+    EXPECT_EQ(selfcal_calibration_reason(calibration_, -1), nullptr);
+    selfcal_watch_destroy(watch_);
+    watch_ = nullptr;
+    selfcal_calibration_destroy(calibration_);
+    calibration_ = nullptr;
+    count_ = 0;
+  }
+  EXPECT_EQ(selfcal_calibration_get_verdict(nullptr), SELFCAL_VERDICT_UNKNOWN);
+  EXPECT_EQ(selfcal_calibration_reason_count(nullptr), 0);
+  EXPECT_EQ(selfcal_calibration_reason(nullptr, 0), nullptr);
+}
+
 TEST_F(CalibrationTest, ReachesAProgramInCxx11) {
-  daemon_.Publish(Message(5, true));
+  v1::Calibration message = Message(5, true);
+  message.mutable_verdict()->set_kind(v1::Verdict::WEAK);
+  message.mutable_verdict()->add_sentences("Little is known of it.");
+  daemon_.Publish(message);
   const Cxx11Calibration seen = WatchInCxx11(daemon_.target());
   EXPECT_EQ(seen.version, 5);
   EXPECT_EQ(seen.callbacks, 1u);
+  EXPECT_EQ(seen.verdict, SELFCAL_VERDICT_WEAK);
+  EXPECT_THAT(seen.reasons, ::testing::ElementsAre("Little is known of it."));
   EXPECT_EQ(seen.focal_x, 400);
   EXPECT_EQ(seen.model, "fov");
   const auto size = static_cast<std::size_t>(TangentSize(Theta()));

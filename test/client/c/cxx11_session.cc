@@ -72,6 +72,8 @@ Cxx11Calibration WatchInCxx11(const std::string& target) {
   if (!calibration) return seen;
   seen.callbacks = callbacks;
   seen.version = calibration.version();
+  seen.verdict = calibration.verdict();
+  seen.reasons = calibration.reasons();
   seen.focal_x = calibration.camera(0).f[0];
   seen.model = calibration.camera(0).model;
   for (const selfcal_component& component : calibration.components()) {

@@ -24,6 +24,8 @@ Cxx11Outcome StreamInCxx11(const std::string& target, const Session& session);
 
 struct Cxx11Calibration {
   std::int64_t version = 0;
+  std::int32_t verdict = 0;
+  std::vector<std::string> reasons;
   double focal_x = 0;
   std::string model;
   std::vector<double> sigmas;

@@ -100,6 +100,25 @@ TEST_F(CalibrationWatchTest, TellsARollBackAndNoneTwiceInARow) {
   EXPECT_THAT(told_.versions(), testing::ElementsAre(3, 2, 3));
 }
 
+TEST_F(CalibrationWatchTest, TellsTheActiveOneAgainWhenItsVerdictChanges) {
+  v1::Calibration version = Version(3);
+  version.mutable_verdict()->set_kind(v1::Verdict::GOOD);
+  daemon_.Publish(version);
+  daemon_.Start();
+  CalibrationWatch watch(Options(), told_.Callback());
+  ASSERT_TRUE(told_.WaitFor(1));
+  EXPECT_EQ(told_.last().verdict, CalibrationVersion::Verdict::kGood);
+  EXPECT_THAT(told_.last().reasons, testing::IsEmpty());
+  version.mutable_verdict()->set_kind(v1::Verdict::NOT_TRUSTWORTHY);
+  version.mutable_verdict()->add_sentences("The device has changed since.");
+  daemon_.Publish(version);
+  ASSERT_TRUE(told_.WaitFor(2));
+  EXPECT_THAT(told_.versions(), testing::ElementsAre(3, 3));
+  EXPECT_EQ(told_.last().verdict, CalibrationVersion::Verdict::kNotTrustworthy);
+  EXPECT_THAT(told_.last().reasons,
+              testing::ElementsAre("The device has changed since."));
+}
+
 TEST_F(CalibrationWatchTest, TellsNoVersionTwiceOverRestarts) {
   daemon_.Publish(Version(1));
   CalibrationWatch watch(Options(), told_.Callback());

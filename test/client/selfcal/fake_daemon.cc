@@ -165,7 +165,7 @@ grpc::Status FakeDaemon::WatchCalibration(
     const v1::WatchCalibrationRequest* request,
     grpc::ServerWriter<v1::Calibration>* writer) {
   EXPECT_EQ(request->parent(), "rigs/device");
-  std::int64_t told = 0;
+  std::optional<std::pair<std::int64_t, v1::Verdict::Kind>> told;
   while (!context->IsCancelled()) {
     v1::Calibration next;
     {
@@ -173,14 +173,17 @@ grpc::Status FakeDaemon::WatchCalibration(
       if (!stream_status_.ok()) return stream_status_;
       // Polls, for a context tells of its end to nobody who waits.
       changed_.wait_for(lock, std::chrono::milliseconds(5));
-      if (!active_.has_value() || active_->version() == told) continue;
+      if (!active_.has_value()) continue;
+      if (told == std::pair(active_->version(), active_->verdict().kind())) {
+        continue;
+      }
       next = *active_;
     }
     if (!writer->Write(next)) break;
-    told = next.version();
+    told = {next.version(), next.verdict().kind()};
     {
       std::lock_guard lock(mutex_);
-      watched_.insert(told);
+      watched_.insert(next.version());
     }
     changed_.notify_all();
   }

@@ -1,5 +1,10 @@
 // A device is knocked in the middle of its life: the whole way, simulated.
+#include <mutex>
+#include <utility>
+#include <vector>
+
 #include "core/model/so3.h"
+#include "server/pipeline/verdict.h"
 #include "test/server/pipeline/pipeline_test.h"
 
 namespace selfcal::server {
@@ -69,6 +74,13 @@ TEST_F(ChangePipelineTest, AKnockedDeviceIsCalibratedOnWhatCameAfterIt) {
   SubmitAll(Session(rig, truth, *before, 6, "before", 2));
   ASSERT_EQ(CountEvents(EventKind::kChangeDetected), 0);
   const auto last = store_->GetActiveCalibration("a");
+  std::mutex mutex;
+  std::vector<std::pair<std::int64_t, VerdictKind>> told;
+  const auto watch = pipeline_->WatchCalibration("a", [&](const auto& active) {
+    const std::lock_guard lock(mutex);
+    told.emplace_back(active->version, VerdictOf(*active).kind);
+  });
+  ASSERT_TRUE(watch.ok()) << watch.status();
 
   Calibration knocked = truth;
   CameraCalibration& camera = knocked.cameras[0];
@@ -101,6 +113,15 @@ TEST_F(ChangePipelineTest, AKnockedDeviceIsCalibratedOnWhatCameAfterIt) {
             << components[i].name;
       }
     }
+  }
+  // Who watches the calibration knew of the knock before there was a new one.
+  {
+    const std::lock_guard lock(mutex);
+    ASSERT_GE(told.size(), 3u);
+    EXPECT_EQ(told[0].first, last->version);
+    EXPECT_NE(told[0].second, VerdictKind::kNotTrustworthy);
+    EXPECT_EQ(told[1], std::pair(last->version, VerdictKind::kNotTrustworthy));
+    EXPECT_GT(told[2].first, last->version);
   }
   const auto runs = store_->ListRuns("a", {});
   ASSERT_TRUE(runs.ok());

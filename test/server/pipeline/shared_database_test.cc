@@ -71,6 +71,25 @@ TEST_F(SharedDatabase, AWatchSeesActivationsOfEveryDaemonOnceAndInOrder) {
   EXPECT_TRUE(has_seen({1, 2, 1, 2}));
 }
 
+TEST_F(SharedDatabase, AWatchSeesWhatAnotherDaemonFindsAboutTheActiveVersion) {
+  SubmitTo(a_, 0);
+  SubmitTo(a_, 1);  // the tables are full
+  ASSERT_TRUE(Eventually(
+      [&] { return a_.store->GetActiveCalibration("a")->version == 2; }));
+  std::atomic<int> seen = 0;
+  std::atomic<bool> is_doubted = false;
+  const auto watch =
+      b_.pipeline->WatchCalibration("a", [&](const auto& active) {
+        is_doubted = active->finding == "biased";
+        ++seen;
+      });
+  ASSERT_TRUE(watch.ok()) << watch.status();
+  ASSERT_EQ(seen, 1);
+  ASSERT_TRUE(a_.domain->ReportDisagreement("a", 2, "biased").ok());
+  EXPECT_TRUE(Eventually([&] { return is_doubted.load(); }));
+  EXPECT_EQ(seen, 2);
+}
+
 TEST_F(SharedDatabase, ADeletionIsAnnouncedAndANewRigOfTheNameIsNotWatched) {
   std::mutex mutex;
   std::vector<std::string> deleted;

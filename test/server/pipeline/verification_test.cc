@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "core/information/segment_information.h"
+#include "server/pipeline/verdict.h"
 #include "server/pipeline/verification_sampler.h"
 #include "server/pipeline/verifier.h"
 #include "server/store/report.h"
@@ -199,9 +200,18 @@ TEST_F(VerificationTest, FindsASolverThatStopsElsewhere) {
     return result;
   };
   Calibrate();
+  std::vector<VerdictKind> told;
+  const auto watch = pipeline_->WatchCalibration(
+      "a",
+      [&told](const auto& active) { told.push_back(VerdictOf(*active).kind); });
+  ASSERT_TRUE(watch.ok()) << watch.status();
   wrong = true;
   const auto verification = Verify();
   ASSERT_TRUE(verification.ok()) << verification.status();
+  // Those who watch the version know when the verification has ended.
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_NE(told[0], VerdictKind::kNotTrustworthy);
+  EXPECT_EQ(told[1], VerdictKind::kNotTrustworthy);
   ASSERT_TRUE(verification->calibration.has_value());
   EXPECT_EQ(verification->calibration->outcome, VerificationOutcome::kDiffers);
   ASSERT_EQ(Disagreements().size(), 1u);
@@ -214,6 +224,7 @@ TEST_F(VerificationTest, FindsASolverThatStopsElsewhere) {
   wrong = false;
   ASSERT_TRUE(Verify().ok());
   EXPECT_THAT(DisagreementOf(2), HasSubstr("imu.gyro.scale.x"));
+  EXPECT_EQ(told.size(), 2u);
 }
 
 TEST_F(VerificationTest, WhatCannotBeComputedIsNotComparedAndNoFinding) {

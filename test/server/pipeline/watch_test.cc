@@ -1,6 +1,7 @@
 #include <atomic>
 #include <mutex>
 
+#include "server/pipeline/verdict.h"
 #include "server/pipeline/watchers.h"
 #include "test/server/pipeline/pipeline_test.h"
 
@@ -55,6 +56,22 @@ TEST(Follows, ActivationsOfARigCountAndThoseOfANewOneAreNotTold) {
   EXPECT_FALSE(Follows(Remembered(last), next));
 }
 
+TEST(Follows, AVersionThatIsNotTrustworthyAnyMoreIsToldOnceMore) {
+  StoredCalibration last;
+  last.run = 1;
+  last.verdict.kind = VerdictKind::kGood;
+  StoredCalibration next = last;
+  next.finding = "The two cores disagree.";
+  EXPECT_TRUE(Follows(Remembered(last), next));
+  EXPECT_FALSE(Follows(Remembered(next), next));
+  // What was read before it comes late.
+  EXPECT_FALSE(Follows(Remembered(next), last));
+  // The device has changed, as well.
+  StoredCalibration changed = next;
+  changed.changed_since = 1;
+  EXPECT_FALSE(Follows(Remembered(next), changed));
+}
+
 TEST_F(WatchTest, EachVersionIsToldOnceInOrder) {
   CreateRig();
   StartOne();
@@ -98,6 +115,39 @@ TEST_F(WatchTest, ARollBackIsToldAsTheNewest) {
   EXPECT_THAT(early.values(), ::testing::ElementsAre(1, 2, 3, 2, 3, 4));
   EXPECT_THAT(late.values(), ::testing::ElementsAre(2, 3, 4));
   EXPECT_EQ(store_->GetCalibration("a", 4)->base_version, 3);
+}
+
+// As if a run had found that the version that stays active is biased.
+TEST_F(WatchTest, ARunThatContradictsTheActiveVersionTellsItAgain) {
+  CreateRig();
+  std::atomic<bool> contradicts = false;
+  const auto calibrate = estimators_.calibrate;
+  estimators_.calibrate = [&, calibrate](const Rig& rig,
+                                         const auto&... arguments) {
+    auto result = calibrate(rig, arguments...);
+    if (contradicts) {
+      EXPECT_TRUE(domain_->ReportDisagreement("a", 2, "biased").ok());
+      result->halves = {83.0, 26, 9e-8};  // it is rejected itself
+    }
+    return result;
+  };
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  Recalibrate(1);
+  Told<std::pair<std::int64_t, VerdictKind>> told;
+  const auto watch = pipeline_->WatchCalibration("a", [&](const auto& active) {
+    told.Add({active->version, VerdictOf(*active).kind});
+  });
+  ASSERT_TRUE(watch.ok()) << watch.status();
+  ASSERT_EQ(told.values().size(), 1u);
+  EXPECT_EQ(told.values()[0].first, 2);
+  EXPECT_NE(told.values()[0].second, VerdictKind::kNotTrustworthy);
+  contradicts = true;
+  Recalibrate(2);
+  ASSERT_TRUE(Eventually([&] { return told.values().size() == 2; }));
+  EXPECT_EQ(told.values()[1],
+            std::pair(std::int64_t{2}, VerdictKind::kNotTrustworthy));
 }
 
 // Activations by hand from two threads while a run publishes: in whatever order
