@@ -444,6 +444,11 @@ absl::StatusOr<StoredRun> Domain::EndRun(const RigClaim& claim,
 
 absl::StatusOr<ReportAnswer> Domain::TakeReport(const DeviceReport& report) {
   const Moment now = clock_();
+  // Before it is looked for, so that no first report slips in between.
+  if (report.deleted) {
+    SELFCAL_RETURN_IF_ERROR(
+        store_->EndReports(report.key, report.attempt, now.time_ns));
+  }
   const auto taken = Change(store_, report.rig, now, [&](UnitOfWork* tx) {
     return server::TakeReport(tx, report, options_.quotas);
   });
@@ -460,10 +465,16 @@ absl::StatusOr<ReportAnswer> Domain::TakeReport(const DeviceReport& report) {
   if (!is_first) return begin_anew;
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig,
                            RigOfReport(report.records, report.rig));
-  SELFCAL_RETURN_IF_ERROR(store_->InsertRig(rig, now, [&](UnitOfWork* tx) {
-    return TakeFirstReport(tx, report, options_.quotas);
-  }));
-  return ReportAnswer();
+  ReportAnswer answer;
+  const absl::Status inserted =
+      store_->InsertRig(rig, now, [&](UnitOfWork* tx) -> absl::Status {
+        SELFCAL_ASSIGN_OR_RETURN(answer,
+                                 TakeFirstReport(tx, report, options_.quotas));
+        return answer.attempt == 0 ? absl::OkStatus()
+                                   : absl::AbortedError("it comes late");
+      });
+  if (!inserted.ok() && answer.attempt == 0) return inserted;
+  return answer;
 }
 
 absl::StatusOr<StoredInstruction> Domain::CreateInstruction(

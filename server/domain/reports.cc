@@ -105,11 +105,20 @@ absl::StatusOr<ReportAnswer> TakeReport(UnitOfWork* tx,
   return answer;
 }
 
-absl::Status TakeFirstReport(UnitOfWork* tx,
-                             const DeviceReport& report,
-                             const Quotas& quotas) {
+absl::StatusOr<ReportAnswer> TakeFirstReport(UnitOfWork* tx,
+                                             const DeviceReport& report,
+                                             const Quotas& quotas) {
+  ReportAnswer answer;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t end,
+                           ReadEndOfReports(tx, report.key));
+  if (report.attempt != 0 && report.attempt < end) {
+    answer.attempt = end;
+    return answer;
+  }
+  SELFCAL_RETURN_IF_ERROR(ForgetEndOfReports(tx, report.key));
   SELFCAL_RETURN_IF_ERROR(CheckRigQuota(tx, quotas));
-  return Take(tx, report, 0, quotas);
+  SELFCAL_RETURN_IF_ERROR(Take(tx, report, 0, quotas));
+  return answer;
 }
 
 absl::StatusOr<StoredInstruction> CreateInstruction(

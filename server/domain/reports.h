@@ -54,9 +54,11 @@ absl::StatusOr<ReportAnswer> TakeReport(UnitOfWork* tx,
                                         const DeviceReport& report,
                                         const Quotas& quotas);
 // Takes the first report of a rig that was inserted in this unit of work.
-absl::Status TakeFirstReport(UnitOfWork* tx,
-                             const DeviceReport& report,
-                             const Quotas& quotas);
+// ReportAnswer::attempt is set if it comes after the device has deleted the
+// rig; the unit of work must not be committed then.
+absl::StatusOr<ReportAnswer> TakeFirstReport(UnitOfWork* tx,
+                                             const DeviceReport& report,
+                                             const Quotas& quotas);
 
 // Gives an instruction to the device of the rig. FAILED_PRECONDITION if none
 // reports it, RESOURCE_EXHAUSTED if too many are pending.

@@ -19,6 +19,7 @@
 #include "server/store/outbox.h"
 #include "server/store/payload.h"
 #include "server/store/replicas.h"
+#include "server/store/report.h"
 #include "server/store/rig_lists.h"
 #include "server/store/rig_work.h"
 #include "server/store/rigs.h"
@@ -304,6 +305,14 @@ class DatabaseStore final : public Store {
   absl::Status AppendEvent(const StoredEvent& event) override {
     return db_->Write(
         [&](Connection* db) { return InsertEvent(db, event).status(); });
+  }
+
+  absl::Status EndReports(std::int64_t key,
+                          std::int64_t attempt,
+                          std::int64_t now_ns) override {
+    return WriteInTransaction(db_.get(), [&](Connection* db) {
+      return WriteEndOfReports(db, key, attempt, now_ns);
+    });
   }
 
   absl::StatusOr<std::optional<ClockRecord>> ReadClock() override {

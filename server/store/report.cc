@@ -386,6 +386,23 @@ absl::Status FromDevice(const absl::Status& status) {
   return status;
 }
 
+// Returns the newest attempt.
+absl::StatusOr<std::int64_t> PutEndOfReports(Connection* db,
+                                             std::int64_t key,
+                                             std::int64_t attempt,
+                                             std::int64_t now_ns) {
+  return InsertReturning(
+      db,
+      "INSERT INTO ended_reports AS e (device, attempt, time_ns) "
+      "VALUES (?1, ?2, ?3) ON CONFLICT (device) DO UPDATE SET "
+      "  attempt = CASE WHEN e.attempt < ?2 THEN ?2 ELSE e.attempt END, "
+      "  time_ns = ?3 "
+      "RETURNING attempt",
+      key,
+      attempt,
+      now_ns);
+}
+
 }  // namespace
 
 absl::StatusOr<StoredRig> RigOfReport(const std::string& bytes,
@@ -444,6 +461,29 @@ absl::Status WriteReportingDevice(UnitOfWork* tx,
              device.waiting,
              device.program_version)
       .Run();
+}
+
+absl::StatusOr<std::int64_t> ReadEndOfReports(UnitOfWork* tx,
+                                              std::int64_t key) {
+  // Writes, so that who tells of the deletion waits for this unit of work.
+  return PutEndOfReports(tx->db(), key, 0, tx->time_ns());
+}
+
+absl::Status ForgetEndOfReports(UnitOfWork* tx, std::int64_t key) {
+  return Statement(tx->db(), "DELETE FROM ended_reports WHERE device = ?1", key)
+      .Run();
+}
+
+absl::Status WriteEndOfReports(Connection* db,
+                               std::int64_t key,
+                               std::int64_t attempt,
+                               std::int64_t now_ns) {
+  SELFCAL_RETURN_IF_ERROR(Statement(db,
+                                    "DELETE FROM ended_reports "
+                                    "WHERE time_ns < ?1",
+                                    now_ns - kEndOfReportsKept_ns)
+                              .Run());
+  return PutEndOfReports(db, key, attempt, now_ns).status();
 }
 
 absl::Status ApplyReport(UnitOfWork* tx,

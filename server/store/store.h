@@ -514,6 +514,14 @@ class Store {
   // Appends an event of the daemon (without a rig); its number is assigned.
   virtual absl::Status AppendEvent(const StoredEvent& event) = 0;
 
+  // --- Reports of devices (report.h).
+  // The device has deleted the rig with this key in its database, as it told in
+  // this attempt: a first report of the rig by an earlier attempt comes late
+  // (ReadEndOfReports). Those that are being taken meanwhile are waited for.
+  virtual absl::Status EndReports(std::int64_t key,
+                                  std::int64_t attempt,
+                                  std::int64_t now_ns) = 0;
+
   // --- The clock of the device, of which there is one record.
   // nullopt before the first is written.
   virtual absl::StatusOr<std::optional<ClockRecord>> ReadClock() = 0;

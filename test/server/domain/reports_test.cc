@@ -477,6 +477,68 @@ TEST_P(ReportsTest, DeviceThatWasRestoredFollowsItsLaterAttempts) {
   EXPECT_EQ(anew_, 0);
 }
 
+// The first report was on its way for long, and nobody waits for its answer.
+TEST_P(ReportsTest, DelayedFirstReportDoesNotBringADeletedRigBack) {
+  for (const bool is_known : {false, true}) {
+    const std::string id = is_known ? "known" : "unknown";
+    CreateDeviceRig(id);
+    ReportNewRigs(ReportedData::kNone);
+    const Report delayed = NextReport();
+    ASSERT_EQ(delayed.number, 1);
+    if (is_known) ReportAll();
+    ASSERT_TRUE(device_domain_->DeleteRig(id, "eve", "sold").ok());
+    ReportAll();
+    ASSERT_TRUE(absl::IsNotFound(store_->GetRig(id).status()));
+    const auto late = Give(delayed);
+    ASSERT_TRUE(late.ok()) << late.status();
+    EXPECT_GT(late->attempt, delayed.attempt);
+    EXPECT_TRUE(absl::IsNotFound(store_->GetRig(id).status()));
+    // Another rig of the name has another key.
+    CreateDeviceRig(id);
+    ReportAll();
+    ExpectSame(id);
+    ASSERT_TRUE(device_domain_->DeleteRig(id, "eve", "the next one").ok());
+    ReportAll();
+  }
+  EXPECT_EQ(anew_, 0);
+}
+
+// It was restored from a backup of before the deletion.
+TEST_P(ReportsTest, DeviceThatHasTheDeletedRigAgainReportsIt) {
+  CreateDeviceRig("a");
+  ReportNewRigs(ReportedData::kNone);
+  Report first = NextReport();
+  ASSERT_TRUE(device_domain_->DeleteRig("a", "eve", "a mistake").ok());
+  ReportAll();
+  const auto late = Give(first);
+  ASSERT_TRUE(late.ok()) << late.status();
+  first.attempt = late->attempt + 1;
+  for (int k = 0; k < 2; ++k) {
+    const auto answer = Give(first);
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    EXPECT_EQ(answer->attempt, 0);
+    EXPECT_TRUE(store_->GetRig("a").ok());
+  }
+}
+
+TEST_P(ReportsTest, DeletionIsForgottenWhenNoReportCanBeOnItsWay) {
+  CreateDeviceRig("a");
+  ReportNewRigs(ReportedData::kNone);
+  const Report first = NextReport();
+  ASSERT_TRUE(device_domain_->DeleteRig("a", "eve", "sold").ok());
+  ReportAll();
+  for (const std::int64_t days : {6, 8}) {
+    ASSERT_TRUE(store_
+                    ->EndReports(first.key + days,
+                                 1,
+                                 NowNs() + days * 24 * 3600 * 1'000'000'000)
+                    .ok());
+    const auto late = Give(first);
+    ASSERT_TRUE(late.ok()) << late.status();
+    EXPECT_EQ(late->attempt == 0, days == 8);
+  }
+}
+
 TEST_P(ReportsTest, DeviceThatDoesNotCountItsAttemptsIsTaken) {
   CreateDeviceRig("a");
   ReportAll();

@@ -125,6 +125,7 @@ TEST_F(PostgresSchemaTest, KeysBeginWithTheRig) {
   EXPECT_THAT(others,
               ElementsAre("clock by clock",
                           "cohorts by label",
+                          "ended_reports by device",
                           "replicas by replica",
                           "rigs by id",
                           "schema_migrations by version"));

@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 22u);
+  ASSERT_EQ(migrations.size(), 23u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -137,6 +137,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[21].name, "0022_report_order.sql");
   EXPECT_EQ(migrations[21].sha256,
             "80bd4d7586b997c08340f60dab60233b65f475e329c5c6f5dc1928515ebaaf6b");
+  EXPECT_EQ(migrations[22].name, "0023_ended_reports.sql");
+  EXPECT_EQ(migrations[22].sha256,
+            "e277f3ecb3eb56c4b305b87fe2dbc0e56350bbb9a92936c1e389e68c8b50a479");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

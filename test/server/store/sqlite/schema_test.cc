@@ -65,6 +65,7 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
       // Of the hub alone.
       "cohorts",
       "cohort_outliers",
+      "ended_reports",
       // The hub has its own key, and derives the rest from what is reported.
       "estimates",
       "rig_name_suffixes",
@@ -185,8 +186,8 @@ TEST_F(SchemaTest, KeysBeginWithTheRig) {
       "WHERE c.pk = 1 AND c.name <> 'rig' ORDER BY text)");
   ASSERT_TRUE(rowids.ok()) << rowids.status();
   EXPECT_EQ(*rowids,
-            "clock by clock,cohorts by label,replicas by replica,"
-            "schema_migrations by version");
+            "clock by clock,cohorts by label,ended_reports by device,"
+            "replicas by replica,schema_migrations by version");
   EXPECT_EQ(ReadIntInFile(Path(),
                           "SELECT count(*) FROM sqlite_schema "
                           "WHERE sql LIKE '%AUTOINCREMENT%'")
