@@ -1,5 +1,7 @@
 #include "server/store/make_store.h"
 
+#include <fmt/format.h>
+
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -140,7 +142,17 @@ class DatabaseStore final : public Store {
     SELFCAL_ASSIGN_OR_RETURN(const Payload payload, Read([&](Connection* db) {
                                return ReadPayload(db, rig, key);
                              }));
-    return UnpackSegment(payload, SegmentText(rig, key));
+    const std::string what = SegmentText(rig, key);
+    SELFCAL_ASSIGN_OR_RETURN(MotionSegment segment,
+                             UnpackSegment(payload, what));
+    // A file whose tree is damaged may lead to another row, which is intact.
+    if (segment.key != key) {
+      return absl::DataLossError(
+          fmt::format("{} is damaged: its data is that of {}; check the disk",
+                      what,
+                      SegmentText(rig, segment.key)));
+    }
+    return segment;
   }
 
   absl::StatusOr<Listed<SessionSummary>> ListSessions(

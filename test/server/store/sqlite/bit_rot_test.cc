@@ -116,6 +116,23 @@ TEST_F(BitRotTest, WhatIsReadIsWhatWasWrittenOrIsRefused) {
   EXPECT_GT(noticed, trials / 2);
 }
 
+// What has its checksum, but is found in the wrong place.
+TEST_F(BitRotTest, DataOfAnotherSegmentIsRefused) {
+  ASSERT_TRUE(Open().ok());
+  ASSERT_TRUE(WriteFixture(store_.get()));
+  ASSERT_TRUE(store_->GetSegmentData("a", {"s", 1}).ok());
+  store_.reset();
+  ASSERT_TRUE(ExecuteInFile(Path(),
+                            "UPDATE payloads SET (data, raw_bytes, sha256) = "
+                            "(SELECT data, raw_bytes, sha256 FROM payloads "
+                            " WHERE sequence = 1) WHERE sequence = 2")
+                  .ok());
+  ASSERT_TRUE(Open().ok());
+  EXPECT_TRUE(store_->GetSegmentData("a", {"s", 0}).ok());
+  const auto other = store_->GetSegmentData("a", {"s", 1}).status();
+  EXPECT_TRUE(absl::IsDataLoss(other)) << other;
+}
+
 // A flip inside a payload's bytes, page by page.
 TEST_F(BitRotTest, AFlipInTheDataOfASegmentIsFoundByTheDoctor) {
   ASSERT_TRUE(Open().ok());
