@@ -40,27 +40,12 @@ absl::StatusOr<std::optional<ReportingDevice>> ReadReportingDevice(
 absl::Status WriteReportingDevice(UnitOfWork* tx,
                                   const ReportingDevice& device);
 
-// How long the deletion of a rig by its device is remembered. No report is on
-// its way for so long.
-inline constexpr std::int64_t kEndOfReportsKept_ns =
-    std::int64_t{7} * 24 * 3600 * 1'000'000'000;
 // The attempt that told of the deletion of the rig with this key in the
 // database of a device (Store::EndReports); 0: none. Until the unit of work is
 // committed, none can.
 absl::StatusOr<std::int64_t> ReadEndOfReports(UnitOfWork* tx, std::int64_t key);
 // It is reported again, by a device that was restored from a backup.
 absl::Status ForgetEndOfReports(UnitOfWork* tx, std::int64_t key);
-
-// --- Without a rig.
-
-// Store::EndReports. The newest attempt stays; what is older than
-// kEndOfReportsKept_ns is removed.
-absl::Status WriteEndOfReports(Connection* db,
-                               std::int64_t key,
-                               std::int64_t attempt,
-                               std::int64_t now_ns);
-
-// --- Within a unit of work.
 
 // Whether there is room for the data of a segment of this size, compressed.
 using AdmitData = std::function<absl::StatusOr<bool>(std::int64_t bytes)>;
@@ -71,5 +56,18 @@ using AdmitData = std::function<absl::StatusOr<bool>(std::int64_t bytes)>;
 absl::Status ApplyReport(UnitOfWork* tx,
                          const std::string& records,
                          const AdmitData& admit_data);
+
+// --- Without a rig.
+
+// The deletion of a rig by its device is remembered for longer than any report
+// is on its way.
+inline constexpr std::int64_t kEndOfReportsKept_ns =
+    std::int64_t{7} * 24 * 3600 * 1'000'000'000;
+// Store::EndReports. The newest attempt stays; what is older than
+// kEndOfReportsKept_ns is removed.
+absl::Status WriteEndOfReports(Connection* db,
+                               std::int64_t key,
+                               std::int64_t attempt,
+                               std::int64_t now_ns);
 
 }  // namespace selfcal::server

@@ -169,8 +169,8 @@ absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t sequence);
 // All that is known of it; it leaves the snapshots of runs that have ended, and
 // tables. Neither a calibration nor an unfinished run may refer to it.
 absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t sequence);
-// The same as its device has done it, which reports itself what that has
-// changed in the records of other segments.
+// The same for a segment that its device has deleted: the device reports what
+// this changed in the records of other segments.
 absl::Status DeleteSegmentAlone(UnitOfWork* tx, std::int64_t sequence);
 
 }  // namespace selfcal::server

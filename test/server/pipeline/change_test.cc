@@ -114,7 +114,7 @@ TEST_F(ChangePipelineTest, AKnockedDeviceIsCalibratedOnWhatCameAfterIt) {
       }
     }
   }
-  // Who watches the calibration knew of the knock before there was a new one.
+  // The watcher knew of the knock before there was a new version.
   {
     const std::lock_guard lock(mutex);
     ASSERT_GE(told.size(), 3u);

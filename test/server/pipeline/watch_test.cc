@@ -64,7 +64,7 @@ TEST(Follows, AVersionThatIsNotTrustworthyAnyMoreIsToldOnceMore) {
   next.finding = "The two cores disagree.";
   EXPECT_TRUE(Follows(Remembered(last), next));
   EXPECT_FALSE(Follows(Remembered(next), next));
-  // What was read before it comes late.
+  // An update that was read before it comes late.
   EXPECT_FALSE(Follows(Remembered(next), last));
   // The device has changed, as well.
   StoredCalibration changed = next;

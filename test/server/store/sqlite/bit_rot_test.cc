@@ -116,7 +116,7 @@ TEST_F(BitRotTest, WhatIsReadIsWhatWasWrittenOrIsRefused) {
   EXPECT_GT(noticed, trials / 2);
 }
 
-// What has its checksum, but is found in the wrong place.
+// The row has its checksum, but is found in the wrong place.
 TEST_F(BitRotTest, DataOfAnotherSegmentIsRefused) {
   ASSERT_TRUE(Open().ok());
   ASSERT_TRUE(WriteFixture(store_.get()));
