@@ -39,7 +39,7 @@ absl::StatusOr<ScoreCommit> CommitScore(
         " was found unusable; send it again under "
         "another session");
   }
-  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.sequence, information));
+  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment, information));
   if (ends) {
     SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.sequence, *ends));
   }
@@ -92,7 +92,7 @@ absl::Status ReplaceScore(UnitOfWork* tx,
   if (segment.state != SegmentState::kScored || !has_data) {
     return absl::OkStatus();
   }
-  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.sequence, information));
+  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment, information));
   SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.sequence, ends));
   // Entries of a joint selection have the scores of all its segments together.
   const bool by_score = rig.rig.selection == Selection::kTables;

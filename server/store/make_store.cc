@@ -1,7 +1,5 @@
 #include "server/store/make_store.h"
 
-#include <fmt/format.h>
-
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -145,12 +143,8 @@ class DatabaseStore final : public Store {
     const std::string what = SegmentText(rig, key);
     SELFCAL_ASSIGN_OR_RETURN(MotionSegment segment,
                              UnpackSegment(payload, what));
-    // A file whose tree is damaged may lead to another row, which is intact.
     if (segment.key != key) {
-      return absl::DataLossError(
-          fmt::format("{} is damaged: its data is that of {}; check the disk",
-                      what,
-                      SegmentText(rig, segment.key)));
+      return OfAnotherSegment("the data of " + what, rig, segment.key);
     }
     return segment;
   }

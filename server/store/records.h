@@ -25,6 +25,14 @@ absl::StatusOr<StoredRig> ParseRig(std::string_view bytes,
 std::string SerializeInformation(const SegmentInformation& information);
 absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
                                                     const std::string& what);
+// The same with the name of its segment; bytes that name another one are
+// DATA_LOSS too.
+std::string SerializeInformationOf(const std::string& rig,
+                                   const SegmentKey& key,
+                                   const SegmentInformation& information);
+absl::StatusOr<SegmentInformation> ParseInformationOf(const std::string& rig,
+                                                      const SegmentKey& key,
+                                                      std::string_view bytes);
 
 // Everything but state, time of creation, run and segments, which are columns,
 // and the validation of a candidate.

@@ -123,7 +123,9 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(
     const std::string bytes = row.has_data ? "" : read.Text(5);
     if (!row.has_data && VerifySha256(bytes, read.Text(6), kWhat).ok()) {
       auto ends = ParseEnds(bytes);
-      if (ends.ok()) row.ends = *std::move(ends);
+      if (ends.ok() && ends->key == row.segment.key) {
+        row.ends = *std::move(ends);
+      }
     }
     rows.push_back(std::move(row));
   }

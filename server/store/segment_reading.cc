@@ -52,6 +52,16 @@ StoredSegment MetadataFromRow(const Statement& row) {
   return segment;
 }
 
+absl::StatusOr<SegmentInformation> InformationFromRow(
+    const std::string& rig,
+    const SegmentKey& key,
+    const std::string& bytes,
+    const std::string& sha256) {
+  SELFCAL_RETURN_IF_ERROR(VerifySha256(
+      bytes, sha256, "the information of " + SegmentText(rig, key)));
+  return ParseInformationOf(rig, key, bytes);
+}
+
 // Fills what it can; the status is that of the information.
 absl::Status FillFromRow(Connection* db,
                          const Statement& row,
@@ -63,11 +73,10 @@ absl::Status FillFromRow(Connection* db,
   if (row.IsNull(13)) {
     return absl::OkStatus();
   }
-  const std::string what =
-      "the information of " + SegmentText(segment->rig, segment->key);
-  const std::string bytes = row.Text(13);
-  SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(14), what));
-  SELFCAL_ASSIGN_OR_RETURN(segment->information, ParseInformation(bytes, what));
+  SELFCAL_ASSIGN_OR_RETURN(
+      segment->information,
+      InformationFromRow(
+          segment->rig, segment->key, row.Text(13), row.Text(14)));
   return absl::OkStatus();
 }
 
@@ -93,6 +102,9 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
   }
   StoredSegment segment;
   SELFCAL_RETURN_IF_ERROR(FillFromRow(db, read, &segment));
+  if (segment.key != key) {
+    return OfAnotherSegment(SegmentText(rig, key), segment.rig, segment.key);
+  }
   return segment;
 }
 
@@ -145,8 +157,9 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
 }
 
 absl::Status WriteScore(UnitOfWork* tx,
-                        std::int64_t sequence,
+                        const SegmentRow& segment,
                         const SegmentInformation& information) {
+  const std::int64_t sequence = segment.sequence;
   tx->Changed(RecordKind::kSegment, sequence);
   SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
                                     "UPDATE segments SET state = 2, fit = ?3 "
@@ -157,7 +170,8 @@ absl::Status WriteScore(UnitOfWork* tx,
                                         ? 0.0
                                         : information.residuals.fit)
                               .Run());
-  const std::string bytes = SerializeInformation(information);
+  const std::string bytes =
+      SerializeInformationOf(tx->rig(), segment.key, information);
   const std::string sha256 = Sha256(bytes);
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
@@ -194,7 +208,6 @@ absl::Status VisitScored(
     UnitOfWork* tx,
     const ScoredFilter& filter,
     const std::function<bool(const ScoredSegment&)>& visit) {
-  constexpr char kWhat[] = "the information of a segment";
   Statement read(
       tx->db(),
       fmt::format("SELECT s.session, s.session_index, s.sequence, "
@@ -221,18 +234,15 @@ absl::Status VisitScored(
       filter.limit,
       filter.not_excluded_for.bits());
   while (read.Next()) {
-    const std::string bytes = read.Text(5);
-    const absl::Status intact = VerifySha256(bytes, read.Text(6), kWhat);
-    const ScoredSegment scored{
-        .segment = {.key = {read.Text(0), read.Int(1)},
-                    .sequence = read.Int(2),
-                    .state = SegmentState::kScored,
-                    .receive_steady_ns = read.Int(3),
-                    .fit = read.Double(4)},
-        .has_data = read.Int(7) != 0,
-        .information = intact.ok()
-                           ? ParseInformation(bytes, kWhat)
-                           : absl::StatusOr<SegmentInformation>(intact)};
+    const SegmentKey key = {read.Text(0), read.Int(1)};
+    const ScoredSegment scored{.segment = {.key = key,
+                                           .sequence = read.Int(2),
+                                           .state = SegmentState::kScored,
+                                           .receive_steady_ns = read.Int(3),
+                                           .fit = read.Double(4)},
+                               .has_data = read.Int(7) != 0,
+                               .information = InformationFromRow(
+                                   tx->rig(), key, read.Text(5), read.Text(6))};
     if (!visit(scored)) break;
   }
   return read.status();

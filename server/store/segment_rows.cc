@@ -40,6 +40,16 @@ std::string SegmentText(const std::string& rig, const SegmentKey& key) {
   return fmt::format("segment {}~{} of rig {}", key.session, key.index, rig);
 }
 
+absl::Status OfAnotherSegment(const std::string& what,
+                              const std::string& other_rig,
+                              const SegmentKey& other) {
+  return absl::DataLossError(fmt::format(
+      "{} is damaged: it is that of {}; check the disk, and restore "
+      "the database from a backup if it is needed",
+      what,
+      SegmentText(other_rig, other)));
+}
+
 absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment) {
   NewSegment packed;
   packed.key = segment.key;

@@ -30,6 +30,11 @@ struct SegmentRow {
 
 // "segment <session>~<index> of rig <rig>", for messages.
 std::string SegmentText(const std::string& rig, const SegmentKey& key);
+// DATA_LOSS: `what` is intact, but that of another segment. A file whose tree
+// is damaged may lead to the wrong row.
+absl::Status OfAnotherSegment(const std::string& what,
+                              const std::string& other_rig,
+                              const SegmentKey& other);
 
 // The record of a segment that was received.
 struct NewSegment {
@@ -150,7 +155,7 @@ absl::StatusOr<std::int64_t> InsertSegment(UnitOfWork* tx,
 // Stored or scored -> scored, with its information and the scores of its
 // groups; replaces earlier ones.
 absl::Status WriteScore(UnitOfWork* tx,
-                        std::int64_t sequence,
+                        const SegmentRow& segment,
                         const SegmentInformation& information);
 // Any state -> unusable.
 absl::Status WriteUnusable(UnitOfWork* tx,

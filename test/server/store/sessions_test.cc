@@ -234,7 +234,8 @@ absl::Status InsertScored(UnitOfWork* tx,
                           const SegmentInformation& information) {
   const auto sequence = InsertSegment(tx, segment);
   if (!sequence.ok()) return sequence.status();
-  const absl::Status scored = WriteScore(tx, *sequence, information);
+  const absl::Status scored =
+      WriteScore(tx, {.key = segment.key, .sequence = *sequence}, information);
   return scored.ok() ? DeleteData(tx, *sequence) : scored;
 }
 

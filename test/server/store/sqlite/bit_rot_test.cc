@@ -133,6 +133,32 @@ TEST_F(BitRotTest, DataOfAnotherSegmentIsRefused) {
   EXPECT_TRUE(absl::IsDataLoss(other)) << other;
 }
 
+TEST_F(BitRotTest, InformationOfAnotherSegmentIsRefused) {
+  ASSERT_TRUE(Open().ok());
+  ASSERT_TRUE(WriteFixture(store_.get()));
+  ASSERT_TRUE(store_->GetSegment("a", {"s", 1}).ok());
+  store_.reset();
+  ASSERT_TRUE(ExecuteInFile(Path(),
+                            "UPDATE segment_information SET "
+                            "(information, sha256) = "
+                            "(SELECT information, sha256 "
+                            " FROM segment_information WHERE sequence = 1) "
+                            "WHERE sequence = 2")
+                  .ok());
+  ASSERT_TRUE(Open().ok());
+  EXPECT_TRUE(store_->GetSegment("a", {"s", 0}).ok());
+  const auto other = store_->GetSegment("a", {"s", 1}).status();
+  EXPECT_TRUE(absl::IsDataLoss(other)) << other;
+  const auto listed = store_->ListSegments("a", Page{50, ""});
+  ASSERT_TRUE(listed.ok()) << listed.status();
+  for (const StoredSegment& segment : listed->items) {
+    const bool refused = segment.key == SegmentKey{"s", 1};
+    EXPECT_EQ(segment.problem.find("it is that of") != std::string::npos,
+              refused)
+        << segment.key.index << ": " << segment.problem;
+  }
+}
+
 // A flip inside a payload's bytes, page by page.
 TEST_F(BitRotTest, AFlipInTheDataOfASegmentIsFoundByTheDoctor) {
   ASSERT_TRUE(Open().ok());
