@@ -148,7 +148,8 @@ std::string ResidualSection(const ReportData& data) {
                                        "position",
                                        "accelerometer bias",
                                        "gyroscope bias"};
-  std::vector<ChartPoint> inertial[std::size(kInertial)];
+  constexpr const char* kImus[] = {"IMU", "second IMU"};
+  std::vector<ChartPoint> inertial[std::size(kImus)][std::size(kInertial)];
   const auto used = UsedSegments(data.calibration);
   for (const v1::Segment* segment : InOrder(data)) {
     if (!segment->has_residuals()) continue;
@@ -162,11 +163,15 @@ std::string ResidualSection(const ReportData& data) {
           fmt::format("{}: {:.3g}", LastPart(segment->name()), value)};
     };
     pixels.push_back(point(residuals.reprojection_rms_px()));
-    for (int k = 0; k < residuals.inertial_rms_size() &&
-                    k < static_cast<int>(std::size(kInertial));
-         ++k) {
-      inertial[k].push_back(point(residuals.inertial_rms(k)));
-    }
+    const auto add = [&](const auto& rms, auto* of_imu) {
+      for (int k = 0;
+           k < rms.size() && k < static_cast<int>(std::size(kInertial));
+           ++k) {
+        of_imu[k].push_back(point(rms.Get(k)));
+      }
+    };
+    add(residuals.inertial_rms(), inertial[0]);
+    add(residuals.imu1_inertial_rms(), inertial[1]);
   }
   std::string body =
       "<p class=\"faint\">Residuals of each segment when it was scored, with "
@@ -176,12 +181,18 @@ std::string ResidualSection(const ReportData& data) {
                                   "Reprojection error of each segment",
                                   "segment",
                                   "camera: root mean square [px]");
-  for (std::size_t k = 0; k < std::size(kInertial); ++k) {
-    charts += PointChart(
-        inertial[k],
-        fmt::format("IMU residual of {} of each segment", kInertial[k]),
-        "segment",
-        fmt::format("IMU, {}: root mean square [sigmas]", kInertial[k]));
+  for (std::size_t imu = 0; imu < std::size(kImus); ++imu) {
+    for (std::size_t k = 0; k < std::size(kInertial); ++k) {
+      const std::vector<ChartPoint>& points = inertial[imu][k];
+      if (imu > 0 && points.empty()) continue;
+      charts += PointChart(
+          points,
+          fmt::format(
+              "{} residual of {} of each segment", kImus[imu], kInertial[k]),
+          "segment",
+          fmt::format(
+              "{}, {}: root mean square [sigmas]", kImus[imu], kInertial[k]));
+    }
   }
   return Section("residuals", "Residuals by sensor", body + Charts(charts));
 }

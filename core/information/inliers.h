@@ -24,7 +24,7 @@ struct InlierSelection {
   std::vector<Eigen::Vector3d> landmarks;
   // Indices into segment.observations, sorted by (landmark, keyframe, camera).
   std::vector<int> inliers;
-  // All fields but inertial_rms.
+  // All fields but those of inertial residuals.
   ResidualStatistics statistics;
 };
 

@@ -40,6 +40,21 @@ ChainStateVector EndTies() {
   return information;
 }
 
+void FindInertialRms(const LinkTransitions& transitions,
+                     int imu,
+                     std::vector<double>* rms) {
+  rms->assign(kStateKinds, 0);
+  for (std::size_t i = 0; i < transitions.size(); ++i) {
+    const std::span<const double> whitened = transitions.Whitened(i, imu);
+    for (int j = 0; j < kStateTangentSize; ++j) {
+      (*rms)[j / 3] += whitened[j] * whitened[j];
+    }
+  }
+  for (double& sum : *rms) {
+    sum = std::sqrt(sum / (3.0 * static_cast<double>(transitions.size())));
+  }
+}
+
 }  // namespace
 
 ChainStateMatrix MotionPrior(int size) {
@@ -134,18 +149,10 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
     }
   }
   inertial_.Linearise(links_, theta0, rig, &transitions_);
-  const std::size_t links = transitions_.size();
-  double squares[kStateKinds] = {};
-  for (std::size_t i = 0; i < links; ++i) {
-    for (int j = 0; j < kStateTangentSize; ++j) {
-      const double r = transitions_.Whitened(i, 0)[j];
-      squares[j / 3] += r * r;
-    }
-  }
-  result_.inertial_rms.clear();
-  for (const double sum : squares) {
-    result_.inertial_rms.push_back(
-        std::sqrt(sum / (3.0 * static_cast<double>(links))));
+  result_.second_inertial_rms.clear();
+  FindInertialRms(transitions_, 0, &result_.inertial_rms);
+  if (theta0.imu1) {
+    FindInertialRms(transitions_, 1, &result_.second_inertial_rms);
   }
 }
 

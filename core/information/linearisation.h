@@ -26,9 +26,8 @@ ChainStateMatrix GaugePrior(const KeyframeState& x, int size = kChainStateSize);
 
 struct LinearisedSegment {
   SharedInformation theta;  // over the whole tangent, in its units
-  // Root mean square of the whitened inertial residuals of the first IMU, by
-  // kind (rotation, velocity, position, b_a, b_g).
-  std::vector<double> inertial_rms;
+  // As in ResidualStatistics.
+  std::vector<double> inertial_rms, second_inertial_rms;
 };
 
 // A workspace for one thread: it allocates nothing after the largest segment.

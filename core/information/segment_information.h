@@ -61,9 +61,10 @@ struct ResidualStatistics {
   int landmarks_used = 0;
   double reprojection_rms_px = 0;     // of the inliers
   double reprojection_median_px = 0;  // of all that project
-  // Root mean square of the whitened inertial residuals, by kind:
-  // (rotation, velocity, position, b_a, b_g).
-  std::vector<double> inertial_rms;
+  // Root mean square of the whitened inertial residuals of the first IMU, by
+  // kind (rotation, velocity, position, b_a, b_g), and of a second one; empty
+  // without one.
+  std::vector<double> inertial_rms, second_inertial_rms;
   // Intervals between IMU samples in which samples are missing
   // (core/factor/sampling.h).
   int imu_gaps = 0;

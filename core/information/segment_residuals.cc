@@ -61,8 +61,7 @@ std::vector<IntervalResidual> Intervals(const Rig& rig,
   return intervals;
 }
 
-}  // namespace
-
+// By kind; there is at least one interval.
 std::vector<double> InertialRms(
     const std::vector<IntervalResidual>& intervals) {
   std::vector<double> rms(kStateKinds, 0);
@@ -76,6 +75,8 @@ std::vector<double> InertialRms(
   }
   return rms;
 }
+
+}  // namespace
 
 SegmentResiduals EvaluateResiduals(const Rig& rig,
                                    const Calibration& theta,
@@ -91,12 +92,14 @@ SegmentResiduals EvaluateResiduals(const Rig& rig,
   SegmentResiduals residuals;
   residuals.observations = Reprojections(*theta_s, segment, motions, selected);
   residuals.intervals = Intervals(rig, *theta_s, segment, 0);
+  residuals.statistics = selected.statistics;
+  residuals.statistics.inertial_rms = InertialRms(residuals.intervals);
   if (theta_s->imu1) {
     const StartedSegment started(*theta_s, segment);
     residuals.second_intervals = Intervals(rig, *theta_s, *started, 1);
+    residuals.statistics.second_inertial_rms =
+        InertialRms(residuals.second_intervals);
   }
-  residuals.statistics = selected.statistics;
-  residuals.statistics.inertial_rms = InertialRms(residuals.intervals);
   return residuals;
 }
 

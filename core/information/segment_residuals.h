@@ -47,8 +47,4 @@ SegmentResiduals EvaluateResiduals(const Rig& rig,
                                    const MotionSegment& segment,
                                    const ScoreOptions& options = {});
 
-// Root mean squares of the whitened residuals, in the order of the parts.
-// `intervals` must not be empty.
-std::vector<double> InertialRms(const std::vector<IntervalResidual>& intervals);
-
 }  // namespace selfcal

@@ -138,6 +138,7 @@ void SegmentScorer::ScoreAt(const Rig& rig,
   result->theta0 = theta0;
   result->residuals = selection.statistics;
   result->residuals.inertial_rms = linearised.inertial_rms;
+  result->residuals.second_inertial_rms = linearised.second_inertial_rms;
   const SampleGaps gaps = FindGaps(SamplesBetweenKeyframes(segment));
   result->residuals.imu_gaps = gaps.count;
   result->residuals.longest_imu_gap_s = gaps.longest_s;

@@ -102,6 +102,9 @@ LinearisedSegment EliminateByCeres(const Rig& of_device,
   }
   LinearisedSegment result;
   result.inertial_rms = RootMeanSquares(inertial.head(of_imu));
+  if (theta0.imu1) {
+    result.second_inertial_rms = RootMeanSquares(inertial.tail(of_imu));
+  }
   const Eigen::VectorXd prior = PriorSigmas(rig);
   const Eigen::VectorXd unit = prior(free).cwiseInverse();
   // Subtracts the rig's prior, which made it definite.

@@ -73,6 +73,9 @@ v1::ResidualStatistics ToProto(const ResidualStatistics& residuals) {
   message.set_reprojection_median_px(residuals.reprojection_median_px);
   message.mutable_inertial_rms()->Assign(residuals.inertial_rms.begin(),
                                          residuals.inertial_rms.end());
+  message.mutable_imu1_inertial_rms()->Assign(
+      residuals.second_inertial_rms.begin(),
+      residuals.second_inertial_rms.end());
   message.set_many_outliers(residuals.many_outliers);
   message.set_fit(residuals.fit);
   message.set_imu_gaps(residuals.imu_gaps);
@@ -92,6 +95,8 @@ ResidualStatistics FromProto(const v1::ResidualStatistics& message) {
   residuals.reprojection_median_px = message.reprojection_median_px();
   residuals.inertial_rms.assign(message.inertial_rms().begin(),
                                 message.inertial_rms().end());
+  residuals.second_inertial_rms.assign(message.imu1_inertial_rms().begin(),
+                                       message.imu1_inertial_rms().end());
   residuals.many_outliers = message.many_outliers();
   residuals.fit = message.fit();
   residuals.imu_gaps = message.imu_gaps();

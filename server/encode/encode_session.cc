@@ -111,7 +111,7 @@ v1::SegmentResiduals Encode(const SegmentResiduals& residuals,
   }
   if (residuals.second_intervals.empty()) return message;
   Encode(residuals.second_intervals, message.mutable_imu1_intervals());
-  for (const double rms : InertialRms(residuals.second_intervals)) {
+  for (const double rms : residuals.statistics.second_inertial_rms) {
     message.add_imu1_inertial_rms(rms);
   }
   return message;

@@ -73,6 +73,17 @@ TEST(Report, ShowsRotationsInDegreesFromTheFactorys) {
                         "<td class=\"number\">4.61</td>"));
 }
 
+TEST(Report, HasChartsOfASecondImuIfTheDeviceHasOne) {
+  ReportData data = ADevice();
+  EXPECT_THAT(WriteReport(data), HasSubstr("IMU, rotation: root mean square"));
+  EXPECT_THAT(WriteReport(data), Not(HasSubstr("second IMU, rotation")));
+  for (v1::Segment& segment : data.segments) {
+    segment.mutable_residuals()->add_imu1_inertial_rms(1.5);
+  }
+  EXPECT_THAT(WriteReport(data),
+              HasSubstr("second IMU, rotation: root mean square [sigmas]"));
+}
+
 TEST(Report, IsOneFileOfBalancedHtml) {
   const std::string html = WriteReport(ADevice());
   EXPECT_TRUE(IsBalanced(html));

@@ -107,12 +107,18 @@ TEST(SegmentResiduals, OfASecondImuAreThoseOfItsOwnReadings) {
   const SegmentResiduals residuals =
       EvaluateResiduals(rig, rig.factory, segment);
   ASSERT_EQ(residuals.second_intervals.size(), segment.keyframes.size() - 1);
-  const std::vector<double> right = InertialRms(residuals.second_intervals);
+  const std::vector<double>& right = residuals.statistics.second_inertial_rms;
   Calibration turned = rig.factory;
   turned.imu1->q_JI = turned.imu1->q_JI * Exp({0.05, 0, 0});
   const std::vector<double> wrong =
-      InertialRms(EvaluateResiduals(rig, turned, segment).second_intervals);
+      EvaluateResiduals(rig, turned, segment).statistics.second_inertial_rms;
   ASSERT_EQ(right.size(), 5u);
+  const std::vector<double> scored =
+      ScoreSegment(rig, rig.factory, segment).residuals.second_inertial_rms;
+  ASSERT_EQ(scored.size(), right.size());
+  for (std::size_t k = 0; k < right.size(); ++k) {
+    EXPECT_NEAR(scored[k], right[k], 1e-6 * right[k]);
+  }
   // Rotation and position; biases are constant in each segment.
   EXPECT_LT(right[0], 1.5);
   EXPECT_GT(wrong[0], 3 * right[0]);

@@ -37,11 +37,14 @@ void ExpectSame(const Rig& rig,
   EXPECT_EQ(structured.rank, ceres.rank);
   EXPECT_EQ(structured.unobserved.size(), ceres.unobserved.size());
   EXPECT_EQ(structured.residuals.inliers, ceres.residuals.inliers);
-  ASSERT_EQ(structured.residuals.inertial_rms.size(),
-            ceres.residuals.inertial_rms.size());
-  for (std::size_t i = 0; i < ceres.residuals.inertial_rms.size(); ++i) {
-    const double rms = structured.residuals.inertial_rms[i];
-    EXPECT_NEAR(rms, ceres.residuals.inertial_rms[i], 1e-6 * (1 + rms));
+  for (const auto rms_of : {&ResidualStatistics::inertial_rms,
+                            &ResidualStatistics::second_inertial_rms}) {
+    const std::vector<double>& found = structured.residuals.*rms_of;
+    const std::vector<double>& right = ceres.residuals.*rms_of;
+    ASSERT_EQ(found.size(), right.size());
+    for (std::size_t i = 0; i < right.size(); ++i) {
+      EXPECT_NEAR(found[i], right[i], 1e-6 * (1 + found[i]));
+    }
   }
   EXPECT_NEAR(structured.residuals.fit, ceres.residuals.fit, 1e-6);
 }

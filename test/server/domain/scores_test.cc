@@ -37,6 +37,8 @@ TEST_P(ScoresTest, InformationComesBackToTheBitAfterReopening) {
   EXPECT_EQ(stored.residuals.reprojection_rms_px,
             information.residuals.reprojection_rms_px);
   EXPECT_EQ(stored.residuals.inertial_rms, information.residuals.inertial_rms);
+  EXPECT_EQ(stored.residuals.second_inertial_rms,
+            information.residuals.second_inertial_rms);
   EXPECT_EQ(stored.residuals.imu_gaps, 2);
   EXPECT_EQ(stored.residuals.longest_imu_gap_s, 0.25);
 }

@@ -42,6 +42,7 @@ inline SegmentInformation FakeInformation(const Rig& rig,
   information.residuals.imu_gaps = 2;
   information.residuals.longest_imu_gap_s = 0.25;
   information.residuals.inertial_rms = {0.1, 0.2, 0.3, 0.4, 1.0 / 3};
+  information.residuals.second_inertial_rms = {0.5, 0.6, 0.7, 0.8, 1.0 / 7};
   return information;
 }
 
