@@ -6,7 +6,6 @@
 namespace selfcal {
 namespace {
 
-constexpr int kMaxRangeIterations = 10;
 // The minimum is accurate enough when an iteration reduces the cost by less.
 constexpr double kEnoughRange = 0.1 * kGrowthTolerance;
 
@@ -14,11 +13,12 @@ constexpr double kEnoughRange = 0.1 * kGrowthTolerance;
 
 LinearRange::LinearRange(const SolverRound& round,
                          const CalibrationEstimate& estimate,
-                         const std::vector<ScreenedLandmark>& landmarks)
+                         const std::vector<ScreenedLandmark>& landmarks,
+                         int max_iterations)
     : round_(round), estimate_(estimate), landmarks_(landmarks) {
   double last = 0;
   SolverRound settling = round_;
-  settling.max_iterations = kMaxRangeIterations;
+  settling.max_iterations = max_iterations;
   const SolverOutcome outcome = SolveRoundByStructure(
       settling,
       [&](int iteration, double cost, const Eigen::VectorXd&) {
@@ -55,7 +55,7 @@ bool LinearRange::GrowsAsClaimed(const Eigen::VectorXd& sigma_step,
   ApplyStep(linearised_, length * sigma_step, &estimate, &landmarks);
   double last = 0;
   SolverRound walk = round_;
-  walk.max_iterations = kMaxRangeIterations;
+  walk.max_iterations = kRangeIterations;
   // If the point on the tangent already costs no more than claimed, the
   // linearisation holds up to that point.
   const SolverOutcome outcome = SolveRoundByStructure(

@@ -28,14 +28,18 @@ namespace selfcal {
 // minimum: the sigma then agrees with the cost to one fifth.
 inline constexpr double kGrowthTolerance = 0.15;
 
+// Enough from the minimum of a calibration.
+inline constexpr int kRangeIterations = 10;
+
 class LinearRange {
  public:
   // Tests about an estimate near its minimum. The round's basis has no columns:
   // theta is held constant. The objects that the round refers to must outlive
-  // this.
+  // this. A minimum that takes more than `max_iterations` is not reached.
   LinearRange(const SolverRound& round,
               const CalibrationEstimate& estimate,
-              const std::vector<ScreenedLandmark>& landmarks);
+              const std::vector<ScreenedLandmark>& landmarks,
+              int max_iterations = kRangeIterations);
 
   // True if keyframes and landmarks reached a minimum. If not, nothing can be
   // tested.

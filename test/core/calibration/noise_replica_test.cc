@@ -39,6 +39,24 @@ Device SimulatedDevice(MotionKind kind, int seed, double duration_s) {
   return device;
 }
 
+void ExpectNearTruth(const Rig& rig,
+                     const Calibration& truth,
+                     const CalibrationResult& result,
+                     int seed) {
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged)
+      << seed << ": " << result.message;
+  const std::vector<int> free = FreeComponents(rig);
+  const Eigen::VectorXd error = BoxMinus(result.theta, truth)(free);
+  const Eigen::MatrixXd covariance = result.covariance(free, free);
+  // 99.99 % of the chi-square distribution with 26 degrees.
+  EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 60.1) << seed;
+  EXPECT_LT(error.cwiseAbs()
+                .cwiseQuotient(covariance.diagonal().cwiseSqrt())
+                .maxCoeff(),
+            4.5)
+      << seed;
+}
+
 TEST(FindSpurious, NamesDirectionsOfWhichInformationDoubles) {
   Rig rig = HandheldRig("r");
   const ThetaSubspace subspace = WholeSubspace(rig);
@@ -128,18 +146,25 @@ TEST(Spurious, ARotationAboutTheImuDoesNotObserveTheLeverArm) {
         SimulatedDevice(MotionKind::kRotationOnly, seed, 12.5);
     const CalibrationResult result =
         Calibrate(device.rig, device.rig.factory, device.segments);
-    ASSERT_EQ(result.status, CalibrateStatus::kConverged) << seed;
-    const std::vector<int> free = FreeComponents(device.rig);
-    EXPECT_LT(result.rank, static_cast<int>(free.size())) << seed;
-    const Eigen::VectorXd error = BoxMinus(result.theta, device.truth)(free);
-    const Eigen::MatrixXd covariance = result.covariance(free, free);
-    // 99.99 % of the chi-square distribution with 26 degrees.
-    EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 60.1) << seed;
-    EXPECT_LT(error.cwiseAbs()
-                  .cwiseQuotient(covariance.diagonal().cwiseSqrt())
-                  .maxCoeff(),
-              4.5)
+    EXPECT_LT(result.rank, static_cast<int>(FreeComponents(device.rig).size()))
         << seed;
+    ExpectNearTruth(device.rig, device.truth, result, seed);
+  }
+}
+
+// Calm and excited by turns, where no replica settled within ten iterations.
+TEST(Spurious, IsFoundOutWhereReplicasAreSlowToSettle) {
+  for (const int seed : {109, 121, 139, 143}) {
+    Rig rig = HandheldRig("simulated");
+    const Calibration truth = rig.factory;
+    rig.factory = PerturbCalibration(truth, {}, seed + 1);
+    SimulationOptions options;
+    options.seed = 1000 + seed;
+    options.revisit_fraction = 0;
+    const auto session = Simulate(
+        rig, truth, rig.factory, *MakeMixed(8.5, seed), "session", options);
+    ExpectNearTruth(
+        rig, truth, Calibrate(rig, rig.factory, session.segments), seed);
   }
 }
 
