@@ -29,6 +29,7 @@ void RunDegenerate(Context* context);
 void RunTrust(Context* context);
 void RunOpenVinsScenario(Context* context);
 void RunOpenVinsRolling(Context* context);
+void RunOpenVinsRollingBatch(Context* context);
 void RunPopulation(Context* context);
 
 const std::vector<Experiment>& Experiments() {
@@ -105,6 +106,9 @@ const std::vector<Experiment>& Experiments() {
       {"openvins_rolling",
        "the same with a rolling shutter of unknown line delay",
        RunOpenVinsRolling},
+      {"openvins_rolling_batch",
+       "batch alone on 18 more seeds of it: chance, or more error than claimed",
+       RunOpenVinsRollingBatch},
       {"population",
        "new devices of a cohort: segments to the target with its prior, and "
        "devices that are not like it",
