@@ -114,10 +114,14 @@ TEST_F(ChangePipelineTest, AKnockedDeviceIsCalibratedOnWhatCameAfterIt) {
       }
     }
   }
-  // The watcher knew of the knock before there was a new version.
+  // The watcher knew of the knock before there was a new version, of which it
+  // is told when this is stored.
+  ASSERT_TRUE(Eventually([&] {
+    const std::lock_guard lock(mutex);
+    return told.size() >= 3;
+  }));
   {
     const std::lock_guard lock(mutex);
-    ASSERT_GE(told.size(), 3u);
     EXPECT_EQ(told[0].first, last->version);
     EXPECT_NE(told[0].second, VerdictKind::kNotTrustworthy);
     EXPECT_EQ(told[1], std::pair(last->version, VerdictKind::kNotTrustworthy));
