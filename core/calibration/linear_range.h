@@ -28,7 +28,7 @@ namespace selfcal {
 // minimum: the sigma then agrees with the cost to one fifth.
 inline constexpr double kGrowthTolerance = 0.15;
 
-// Enough from the minimum of a calibration.
+// Iterations of keyframes and landmarks, from where a calibration ended.
 inline constexpr int kRangeIterations = 10;
 
 class LinearRange {

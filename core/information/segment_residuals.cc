@@ -61,7 +61,7 @@ std::vector<IntervalResidual> Intervals(const Rig& rig,
   return intervals;
 }
 
-// By kind; there is at least one interval.
+// Root mean squares of the kinds, over at least one interval.
 std::vector<double> InertialRms(
     const std::vector<IntervalResidual>& intervals) {
   std::vector<double> rms(kStateKinds, 0);

@@ -171,17 +171,11 @@ struct Seed {
   int sent = 0;
 };
 
-// A device and what its SLAM system sends.
-struct OpenVinsDevice {
+// The device has one session, which does not depend on the active calibration.
+TrustDevice SimulateDevice(Shutter shutter,
+                           std::uint64_t seed,
+                           double duration_s) {
   TrustDevice device;
-  std::shared_ptr<const SimulatedSession> session;
-};
-
-OpenVinsDevice SimulateDevice(Shutter shutter,
-                              std::uint64_t seed,
-                              double duration_s) {
-  OpenVinsDevice simulated;
-  TrustDevice& device = simulated.device;
   device.rig = TrueRig(shutter);
   device.truth = device.rig.factory;
   device.sensors = device.rig;
@@ -195,36 +189,32 @@ OpenVinsDevice SimulateDevice(Shutter shutter,
   options.min_depth_m = 3;
   options.max_depth_m = 8;
   const Motion motion = MakeMotion(kGore, duration_s);
-  simulated.session =
+  const auto session =
       std::make_shared<const SimulatedSession>(Simulate(device.sensors,
                                                         *device.truth,
                                                         device.rig.factory,
                                                         *motion.trajectory,
                                                         motion.name,
                                                         options));
-  device.sessions.push_back([session = simulated.session](const Calibration&) {
+  device.sessions.push_back([session](const Calibration&) {
     return TrustSession{session->segments, {}};
   });
-  return simulated;
+  return device;
 }
 
-Estimated RunBatch(const OpenVinsDevice& simulated) {
-  const std::vector<MotionSegment>& segments = simulated.session->segments;
-  const CalibrationResult batch =
-      CalibrateOn(simulated.device.rig,
-                  segments,
-                  AllSegments(static_cast<int>(segments.size())));
-  Estimated estimated = Assess(simulated.device.rig,
-                               *simulated.device.truth,
-                               batch.theta,
-                               batch.covariance);
+Estimated RunBatch(const TrustDevice& device) {
+  const std::vector<MotionSegment> segments =
+      device.sessions.front()(device.rig.factory).segments;
+  const CalibrationResult batch = CalibrateOn(
+      device.rig, segments, AllSegments(static_cast<int>(segments.size())));
+  Estimated estimated =
+      Assess(device.rig, *device.truth, batch.theta, batch.covariance);
   estimated.segments = batch.segments;
   return estimated;
 }
 
 Seed RunSeed(Shutter shutter, std::uint64_t seed, double duration_s) {
-  const OpenVinsDevice simulated = SimulateDevice(shutter, seed, duration_s);
-  const TrustDevice& device = simulated.device;
+  const TrustDevice device = SimulateDevice(shutter, seed, duration_s);
   Seed result{device.rig, {}, {}};
   const TrustOutcome driven = Drive(device);
   if (driven.final_version == 1) {
@@ -240,7 +230,7 @@ Seed RunSeed(Shutter shutter, std::uint64_t seed, double duration_s) {
       result.tables.segments = static_cast<int>(version.stored.segments.size());
     }
   }
-  result.batch = RunBatch(simulated);
+  result.batch = RunBatch(device);
   return result;
 }
 
