@@ -53,6 +53,13 @@ std::vector<Belief> Beliefs(const NoiseFactorsDevice& device) {
   return beliefs;
 }
 
+// Devices by which the accuracy of the noise scales is measured: the chance in
+// four datasets is as large as the errors.
+constexpr int kAccuracyDevices = 20;
+constexpr int kQuickAccuracyDevices = 2;
+constexpr std::uint64_t kAccuracyFirstSeed = 5000;
+constexpr double kSpreadProbability = 0.95;
+
 // Of one dataset: found factors over the truth, by belief and kind.
 using FoundFactors = std::vector<std::vector<NoiseScale>>;
 
@@ -185,6 +192,60 @@ void FindFactors(Context* context) {
       "noise_factors.worst_error_of_a_determined_factor", worst, 0.2);
 }
 
+// Bias and spread of the logarithms of the noise scales over many devices whose
+// IMU is 30 times worse and whose rig states all noise 3 times too small.
+void MeasureAccuracy(Context* context) {
+  const NoiseFactorsDevice device = Devices(context->quick())[0];
+  const Belief belief = {"all 3 times too small", AllKinds(), 1.0 / 3};
+  const int count = context->quick() ? kQuickAccuracyDevices : kAccuracyDevices;
+  std::vector<std::vector<NoiseScale>> found(count);
+  context->ForEach(count, [&](int i) {
+    SimulationOptions options = DatasetOptions(i);
+    options.seed = kAccuracyFirstSeed + i;
+    const Dataset dataset = MakeDataset(i % kDatasets,
+                                        device.duration_s,
+                                        WithNoise(device.inertial_factor),
+                                        options);
+    const Rig rig = Believe(dataset.rig, belief);
+    found[i] = OverTruth(
+        Calibrate(rig, rig.factory, dataset.segments()), rig, dataset.rig);
+    context->Progress("accuracy, device " + std::to_string(i + 1));
+  });
+  ResultTable table({"kind",
+                     "found over truth, geometric mean",
+                     "standard error of its logarithm",
+                     "spread of the logarithm",
+                     "claimed sigma of the logarithm",
+                     "within 10 %"});
+  for (const NoiseKind kind : AllKinds()) {
+    if (!IsWhite(kind)) continue;
+    std::vector<double> logs, claimed;
+    for (const std::vector<NoiseScale>& scales : found) {
+      logs.push_back(std::log(scales.at(IndexOf(kind)).factor));
+      claimed.push_back(scales.at(IndexOf(kind)).log_sigma);
+    }
+    const double spread = StandardDeviation(logs);
+    table.Add({NoiseKindName(kind),
+               std::exp(Mean(logs)),
+               spread / std::sqrt(count),
+               spread,
+               Rms(claimed),
+               std::to_string(std::count_if(
+                   logs.begin(),
+                   logs.end(),
+                   [](double x) { return std::abs(std::exp(x) - 1) <= 0.1; })) +
+                   " of " + std::to_string(count)});
+    const std::string name = "noise_factors.accuracy_" + NoiseKindName(kind);
+    context->Within(name + "_mean", std::exp(Mean(logs)), 0.9, 1.1);
+    context->AtMost(
+        name + "_spread_over_claimed",
+        spread / Rms(claimed),
+        std::sqrt(ChiSquareQuantile(0.5 + kSpreadProbability / 2, count - 1) /
+                  (count - 1)));
+  }
+  context->WriteTable("accuracy", table);
+}
+
 // Of the processor, on one thread: what else it does does not count.
 double Seconds(const Dataset& dataset, const CalibrateOptions& options) {
   double least = std::numeric_limits<double>::infinity();
@@ -224,6 +285,7 @@ void MeasureCost(Context* context) {
 void RunNoiseFactors(Context* context) {
   MeasureCost(context);
   FindFactors(context);
+  MeasureAccuracy(context);
 }
 
 }  // namespace selfcal

@@ -81,15 +81,17 @@ void WriteParameters(const RecordedDevice& device,
   ResultTable table({"parameter",
                      "unit",
                      "stored",
-                     "kept segments",
+                     "kept segments minus stored",
                      "sigma",
-                     "all segments",
+                     "all segments minus stored",
                      "sigma of it",
                      "difference [sigma of kept]"});
-  const auto components = TangentComponents(device.rig.factory);
-  const Eigen::VectorXd before = ReadableValues(device.rig.factory);
-  const Eigen::VectorXd a = ReadableValues(kept.theta);
-  const Eigen::VectorXd b = ReadableValues(all.theta);
+  const Calibration& stored = device.rig.factory;
+  const auto components = TangentComponents(stored);
+  const Eigen::VectorXd before = ReadableValues(stored);
+  // Differences: the vector of a rotation near pi may change its sign.
+  const Eigen::VectorXd a = BoxMinus(kept.theta, stored);
+  const Eigen::VectorXd b = BoxMinus(all.theta, stored);
   const Eigen::VectorXd difference = BoxMinus(kept.theta, all.theta);
   for (const int i : FreeComponents(device.rig)) {
     const double sigma = std::sqrt(kept.covariance(i, i));
