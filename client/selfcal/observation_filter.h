@@ -21,9 +21,10 @@ class ObservationFilter {
   void StartNewIds() { ++id_epoch_; }
 
   // Returns the observations with a finite pixel that lie inside the image of
-  // their camera. theta is null if it is not known: then any finite pixel is
-  // inside. Observations by cameras that theta does not have are kept: the
-  // daemon names them. Throws std::bad_alloc.
+  // their camera, or as little outside as the daemon permits
+  // (Limits::pixel_margin_px). theta is null if it is not known: then any
+  // finite pixel is inside. Observations by cameras that theta does not have
+  // are kept: the daemon names them. Throws std::bad_alloc.
   std::vector<KeyframeObservation> Filter(
       std::span<const KeyframeObservation> observations,
       const Calibration* theta);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <string_view>
 #include <utility>
 
 #include "client/text/estimate_text.h"
@@ -105,6 +106,10 @@ void AddValidation(const v1::Validation& validation, FactList* facts) {
 }
 
 std::string NoiseName(const std::string& kind) {
+  constexpr std::string_view kSecondImu = "imu1_";
+  if (kind.starts_with(kSecondImu)) {
+    return "second " + NoiseName(kind.substr(kSecondImu.size()));
+  }
   if (kind == "pixel") return "pixel sigma";
   if (kind == "gyro") return "gyro noise";
   if (kind == "accel") return "accel noise";

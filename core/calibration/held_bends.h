@@ -21,7 +21,8 @@ namespace selfcal {
 // at least as much about it as the prior, D x k, in units of the tangent: the
 // root mean square of q h^2, given what the data and the prior say about h. q
 // is the mean of the minima with the direction held at one sigma of h to either
-// side, less the present one. At most one sigma of the prior long.
+// side, less the present one, over the variance of h. At most one sigma of the
+// prior long. Directions for which these minima are not reached have no column.
 Eigen::MatrixXd BendsOfHeld(const WorkingPoint& point);
 
 }  // namespace selfcal

@@ -90,8 +90,8 @@ std::optional<Rig> Reweight(const Rig& stated,
     }
     const double before = NoiseOf(scale.kind, taken);
     const double most = kMostOff * NoiseOf(scale.kind, stated);
-    // Mean of the variance, which is the relevant quantity, over the
-    // uncertainty of the scale.
+    // Expected variance, which is the relevant quantity, given the uncertainty
+    // of the scale.
     const double uncertain =
         std::exp(std::min(scale.log_sigma * scale.log_sigma, kMostUncertain));
     const double after = std::clamp(scale.factor * uncertain * before,

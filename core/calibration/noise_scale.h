@@ -71,11 +71,11 @@ void ScaleNoise(NoiseKind kind, double factor, Rig* rig);
 
 // Returns the rig with the noise that `scales`, which are relative to the
 // noise of `taken`, suggest. It applies those that are determined, or larger
-// than one by more than one of their standard deviations, each with the mean of
-// the variance over its uncertainty. The noise of any kind stays within a
-// factor of 30 of `stated`, in both directions, and that of pixels above 0.05
-// px unless `stated` is less. Returns nullopt if the difference is less than 5
-// % for all kinds.
+// than one by more than one of their standard deviations, each with the
+// expected variance, given the uncertainty of the scale. The noise of any kind
+// stays within a factor of 30 of `stated`, in both directions, and that of
+// pixels above 0.05 px unless `stated` is less. Returns nullopt if the
+// difference is less than 5 % for all kinds.
 std::optional<Rig> Reweight(const Rig& stated,
                             const Rig& taken,
                             const std::vector<NoiseScale>& scales);

@@ -21,13 +21,14 @@ struct SpuriousTest {
   // False if no replica with added noise reaches a minimum: nothing can be said
   // about the estimated directions.
   bool made = true;
-  // The subspace that also holds the spurious directions; nullopt if there is
+  // The subspace that also holds the spurious directions; nullopt if there are
   // none.
   std::optional<ThetaSubspace> remaining = std::nullopt;
 };
 
 // Finds the directions whose information stems from noise in the states
 // (noise_replica.h). `segments` and `partitioning` are those of the problem.
+// The linear system of `point` loses its memory.
 SpuriousTest HoldSpuriousDirections(
     const std::vector<const MotionSegment*>& segments,
     const Partitioning& partitioning,

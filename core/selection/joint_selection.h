@@ -63,9 +63,11 @@ struct JointChange {
 
 // Decides about one more segment: reject it, insert it, or replace with it the
 // segment whose removal leaves the most information. A candidate with a key of
-// the set changes nothing; `set` is in order of arrival. While there is room, a
-// segment with sufficient gain enters; a full set changes only if the criterion
-// grows by min_gain_nats / capacity. Of equal segments the older ones stay.
+// the set changes nothing, nor does one with a value that is not finite; `set`
+// is in order of arrival. While there is room, a segment with sufficient gain
+// enters; a full set changes only if the criterion grows by min_gain_nats /
+// capacity. Gains are of 1/2 ln det, whatever the criterion, which only decides
+// about replacements. Of equal segments the older ones stay.
 JointChange Offer(const JointSettings& settings,
                   const Candidate& candidate,
                   std::span<const Candidate> set);

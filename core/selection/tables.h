@@ -35,7 +35,8 @@ struct Table {
   std::int64_t scored = 0;          // number of segments that were offered
 
   bool full() const { return static_cast<int>(entries.size()) >= capacity; }
-  // Not full although 10 N segments were offered; runs no longer wait for it.
+  // Not full although 10 N segments were offered; runs no longer wait for it,
+  // unless it is that of a joint selection.
   bool starved() const {
     return !full() && scored >= 10 * static_cast<std::int64_t>(capacity);
   }
@@ -66,9 +67,9 @@ double TemperatureBinOf(const Rig& rig);
 // than their share; any other competes with the entries of its own bin, or, if
 // that has none and no other has more than its share, with all. A key that is
 // already in the table changes nothing and is not counted. A segment with an
-// entropy or gain that is not finite is counted and never enters. An evicted
-// segment cannot return: the entries that displaced it are better, or equal and
-// older.
+// entropy or gain that is not finite is counted and never enters. Without bins,
+// an evicted segment cannot return: the entries that displaced it are better,
+// or equal and older.
 TableUpdate Offer(const TableEntry& candidate,
                   double min_gain_nats,
                   Table* table,

@@ -13,8 +13,8 @@
 
 namespace selfcal::server {
 
-// The numbers are bits of the column rigs.alarms: only ever extended. A higher
-// one is more urgent.
+// The numbers are positions of bits in the column rigs.alarms: only ever
+// extended. A higher one is more urgent.
 enum class Alarm {
   kSilent = 0,  // its device has not reported for a day
   kTableStarved = 1,
@@ -39,6 +39,8 @@ std::vector<Alarm> AlarmsOf(const RigSummary& rig, std::int64_t now_ns);
 // Stores the alarms of the rig as its records are now.
 absl::Status StoreAlarms(UnitOfWork* tx);
 // Does so if the unit of work has changed a record on which they depend.
+// Neither the time nor the cohort of the rig is one: Domain::NoteSilentDevices
+// and Domain::NoteOutliers store what these change.
 absl::Status UpdateAlarms(UnitOfWork* tx);
 
 }  // namespace selfcal::server

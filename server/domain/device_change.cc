@@ -148,9 +148,9 @@ absl::Status StartAfter(UnitOfWork* tx,
 
 Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
                              const StoredCalibration& calibration,
-                             std::int64_t now_ns) {
+                             std::int64_t time_ns) {
   const auto age_ns =
-      static_cast<double>(now_ns - calibration.create_steady_ns);
+      static_cast<double>(time_ns - calibration.create_steady_ns);
   return AgedCovariance(rig.rig,
                         WalkDensities(rig.rig, rig.policy.walk_densities),
                         calibration.covariance,

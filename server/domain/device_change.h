@@ -15,7 +15,7 @@
 
 namespace selfcal::server {
 
-// Covariance of a calibration at the steady time `now_ns`: increased by the
+// Covariance of a calibration at the steady time `time_ns`: increased by the
 // random walk of the rig since the calibration was computed.
 Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
                              const StoredCalibration& calibration,
@@ -32,17 +32,19 @@ struct NewestExamined {
 };
 
 // Tests the newest scored segments of the rig against its active calibration,
-// if that is the result of a run since the last device change. Segments that it
-// was computed on, and damaged ones, are left out. A segment that shows another
-// theta than both of its neighbours (core/change/isolated.h) is quarantined. A
-// device change that is detected is stored.
+// if that is the result of a run since the last device change and has measured
+// the track noise. Segments that it was computed on, damaged ones, misfits and
+// those that cannot be tested against it are left out. A segment that shows
+// another theta than both of its neighbours (core/change/isolated.h) is
+// quarantined; the first and the last one, which have one neighbour, are only
+// left out. A device change that is detected is stored.
 absl::StatusOr<NewestExamined> ExamineNewest(UnitOfWork* tx,
                                              const StoredRig& rig,
                                              const ChangeOptions& options);
 
 // Stores the device change that the result of a run shows among its segments
-// (DeviceSplit), if it is probable enough and no change was stored since the
-// run was created.
+// (DeviceSplit), if chance explains it rarely enough, no change was stored
+// since the run was created, and its first segment still exists.
 absl::StatusOr<std::optional<StoredChange>> StoreSplit(
     UnitOfWork* tx,
     const StoredRun& run,

@@ -6,9 +6,9 @@
 //
 // Any thread may call. All methods that write return after the commit, but for
 // BeginPutSegment. Of a rig that a device reports only a report, and DeleteRig,
-// change anything: FAILED_PRECONDITION for others. Those that take a RigClaim
-// are the work of the daemon that has claimed the rig: ClaimLost if the claim
-// does not hold any more.
+// change records: FAILED_PRECONDITION for others; its alarms and instructions
+// are the hub's own. Those that take a RigClaim are the work of the daemon that
+// has claimed the rig: ClaimLost if the claim does not hold any more.
 #pragma once
 
 #include <absl/status/status.h>

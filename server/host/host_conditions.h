@@ -24,8 +24,9 @@ struct HostFiles {
   std::filesystem::path load = "/proc/loadavg";
 };
 
-// Any thread may call. If a file cannot be read, runs are deferred with a
-// message that says so: a limit that is set is never ignored.
+// Any thread may call. If the load cannot be read, runs are deferred with a
+// message that says so; a host without a folder of power supplies has no
+// battery.
 std::unique_ptr<Conditions> MakeHostConditions(const HostLimits& limits,
                                                const HostFiles& files = {});
 

@@ -15,10 +15,12 @@ namespace selfcal::server {
 // - Not trustworthy if a check failed; the sentences are those of the failed
 //   checks.
 // - Weak if directions were held constant, if the data determines a component
-//   little better than the prior (its sigma is over half the prior's), or if a
-//   check could not be made, or if an effect that the rig does not estimate
-//   shifts a component by over its sigma, each with a sentence. Held-out
-//   segments may be missing if two halves agree.
+//   little better than the prior (its sigma is over half the prior's), if a
+//   check could not be made, or if `effects` or `remembered` passed with a
+//   sentence: an effect that the rig does not estimate shifts a component by
+//   over its sigma, or the segments whose data is gone contradict it together.
+//   Each has a sentence.
+//   Held-out segments may be missing if two halves agree.
 // - Good otherwise; the notes of the checks are its sentences.
 Verdict MakeVerdict(const Rig& rig,
                     const CalibrationResult& result,

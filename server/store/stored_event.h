@@ -6,7 +6,8 @@
 
 namespace selfcal::server {
 
-// The numbers, from 1, are stored in the database: only ever extended.
+// Their positions, counted from 1, are stored in the database: only ever
+// extended.
 enum class EventKind {
   kRigCreated,
   kRunStarted,

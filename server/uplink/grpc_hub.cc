@@ -101,7 +101,8 @@ class GrpcHub final : public Hub {
     if (target.starts_with(kInsecure)) target.erase(0, kInsecure.size());
     if (IsEncrypted(options_.hub)) {
       const auto tls = ReadTls(options_);
-      if (!tls.ok()) return tls.status();
+      // The hub was not asked, so it has refused nothing.
+      if (!tls.ok()) return absl::UnavailableError(tls.status().message());
       credentials = grpc::SslCredentials(*tls);
     }
     grpc::ChannelArguments arguments;

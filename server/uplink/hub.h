@@ -15,8 +15,8 @@ class Hub {
  public:
   virtual ~Hub() = default;
 
-  // UplinkService.Report. UNAVAILABLE if the hub cannot be reached, CANCELLED
-  // after Cancel.
+  // UplinkService.Report. UNAVAILABLE if the hub cannot be reached, or a TLS
+  // file cannot be read; CANCELLED after Cancel.
   virtual absl::StatusOr<v1::ReportResponse> Report(
       const v1::ReportRequest& request) = 0;
   // Ends a report that is under way, and all later ones. Any thread may call.

@@ -40,13 +40,16 @@ class Reporter {
     std::int64_t reports = 0;
     std::int64_t bytes = 0;    // of all requests, also of those that failed
     std::int64_t waiting = 0;  // records that are left
-    absl::Status status;       // an error: the hub cannot be reached
-    // Why the hub has refused the reports of a rig, which are tried again
-    // later; empty: it has refused none. Those of the others were sent.
+    // An error: the hub cannot be reached, or the round is CANCELLED.
+    absl::Status status;
+    // Why the hub has refused the reports of a rig, the last one if there are
+    // several, which are tried again later; empty: it has refused none. Those
+    // of the others were sent.
     std::string refusal;
   };
   // Sends one report of each rig that has something to report, or from which
-  // the hub has not heard for the interval. `pace` is called before each with
+  // the hub has not heard for the interval. Rigs that were never reported begin
+  // with all of their records. `pace` is called before each with
   // its bytes, and may wait; false: the daemon is stopping, and the round is
   // CANCELLED. An error is one of the store.
   using Pace = std::function<bool(std::int64_t bytes)>;

@@ -62,6 +62,16 @@ TEST_F(GrpcHubTest, ErrorsOfTheHubArriveWithTheirCode) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("cannot be read"));
 }
 
+// The device tries again, and no rig is blamed.
+TEST_F(GrpcHubTest, AHubWhoseTlsFilesCannotBeReadIsUnavailable) {
+  const v1::ReportRequest request = FirstReport();
+  const auto hub = MakeGrpcHub(
+      {.hub = "hub.example:7447", .ca = socket_folder_.File("missing.pem")});
+  const absl::Status status = hub->Report(request).status();
+  EXPECT_TRUE(absl::IsUnavailable(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("missing.pem"));
+}
+
 TEST_F(GrpcHubTest, CancelEndsAllReports) {
   const v1::ReportRequest request = FirstReport();
   const auto hub = MakeGrpcHub({.hub = address_});
