@@ -1,5 +1,6 @@
 #include <map>
 #include <set>
+#include <utility>
 
 #include "core/model/temperature.h"
 #include "proto/resource_names.h"
@@ -16,6 +17,7 @@
 #include "server/encode/encode_verification.h"
 #include "server/encode/reason.h"
 #include "server/encode/versions.h"
+#include "server/pipeline/verdict.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
@@ -194,8 +196,8 @@ absl::StatusOr<std::shared_ptr<void>> WatchCalibration(
   const auto rig = ParseRigName(request.parent());
   if (!rig) return BadName("parent", "rigs/{rig}");
   // A version that was rolled back and became active again while the reader was
-  // slow is the one that the reader has.
-  auto sent = std::make_shared<std::int64_t>(0);
+  // slow is the one that the reader has, unless its verdict is another one.
+  auto sent = std::make_shared<std::pair<std::int64_t, VerdictKind>>();
   const Subject about{kCalibrationType, request.parent(), {}};
   auto subscription = context.pipeline->WatchCalibration(
       *rig, [=, &context](const auto& active) {
@@ -203,9 +205,8 @@ absl::StatusOr<std::shared_ptr<void>> WatchCalibration(
             "",
             [=,
              &context]() -> absl::StatusOr<std::shared_ptr<const WatchUpdate>> {
-              if (active->version == std::exchange(*sent, active->version)) {
-                return nullptr;
-              }
+              const std::pair now(active->version, VerdictOf(*active).kind);
+              if (std::exchange(*sent, now) == now) return nullptr;
               auto update = context.versions->Get(active);
               if (!update.ok()) return About(update.status(), about);
               return update;

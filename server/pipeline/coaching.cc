@@ -88,8 +88,9 @@ absl::StatusOr<RigCoaching> RigCoach::Advise(const std::string& rig_name) {
 
 RigCoach::Kept RigCoach::PredictionsFor(const StoredRig& rig,
                                         const StoredCalibration& active) {
-  const std::string key =
-      SerializeRig(rig) + "/" + std::to_string(active.version);
+  const std::string key = SerializeRig(rig) + "/" +
+                          std::to_string(active.rig_key) + "/" +
+                          std::to_string(active.version);
   if (Kept kept = Find(key)) return kept;
   const std::lock_guard lock(computing_);
   if (Kept kept = Find(key)) return kept;

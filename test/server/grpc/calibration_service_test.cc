@@ -306,6 +306,29 @@ TEST_F(CalibrationServiceTest, WatchIsToldOfARollBackAndNoneTwice) {
   reader->Finish();
 }
 
+TEST_F(CalibrationServiceTest, WatchIsToldOnceThatAVersionIsNotTrustworthy) {
+  AddCalibrated();
+  Context context;
+  const auto reader = Watch(&context, "rigs/r");
+  v1::Calibration seen;
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 2);
+  EXPECT_NE(seen.verdict().kind(), v1::Verdict::NOT_TRUSTWORTHY);
+  ASSERT_TRUE(domain_->ReportDisagreement("r", 2, "the cores disagree").ok());
+  for (int i = 0; i < 2; ++i) {
+    pipeline_->Publish(*store_->GetActiveCalibration("r"));
+  }
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 2);
+  EXPECT_EQ(seen.verdict().kind(), v1::Verdict::NOT_TRUSTWORTHY);
+  v1::Calibration active;
+  ASSERT_TRUE(Activate("rigs/r/calibrations/1", "drifts", &active).ok());
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 1);
+  context.TryCancel();
+  reader->Finish();
+}
+
 TEST_F(CalibrationServiceTest, RolledBackVersionSaysSo) {
   AddCalibrated();
   v1::Calibration read;

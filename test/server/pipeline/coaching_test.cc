@@ -165,6 +165,17 @@ TEST_F(Coaching, PredictsOnceForAVersion) {
   EXPECT_EQ(coach.computed(), 2);
 }
 
+// The new one has versions of the same numbers, with other values.
+TEST_F(Coaching, PredictsAgainForARigThatIsCreatedAgain) {
+  CreateRig("a");
+  RigCoach coach(store_.get());
+  EXPECT_TRUE(coach.Advise("a").ok());
+  ASSERT_TRUE(domain_->DeleteRig("a", "operator", "sold").ok());
+  CreateRig("a");
+  EXPECT_TRUE(coach.Advise("a").ok());
+  EXPECT_EQ(coach.computed(), 2);
+}
+
 // With room for the predictions of one rig, the other's are computed again, and
 // are the same.
 TEST_F(Coaching, KeepsNoMoreThanItMay) {
