@@ -28,6 +28,8 @@ absl::StatusOr<ScoreCommit> CommitScore(
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
   ScoreCommit commit;
+  SELFCAL_ASSIGN_OR_RETURN(commit.basis.active, ActiveVersion(tx));
+  commit.basis.prior_sigmas = PriorSigmas(rig.rig);
   if (segment.state == SegmentState::kScored) {
     SELFCAL_ASSIGN_OR_RETURN(commit.tables,
                              TablesOfSegment(tx, segment.sequence));

@@ -5,6 +5,8 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,9 +20,23 @@
 
 namespace selfcal::server {
 
+// What a score depends on besides its segment.
+struct ScoreBasis {
+  std::int64_t active = 0;       // version
+  Eigen::VectorXd prior_sigmas;  // of the rig
+
+  bool operator==(const ScoreBasis& other) const {
+    return active == other.active && prior_sigmas == other.prior_sigmas;
+  }
+};
+
 // Result of the commit of a score.
 struct ScoreCommit {
-  std::vector<std::string> tables;       // groups it entered
+  std::vector<std::string> tables;  // groups it entered
+  // When it was committed. If this is not what the score was computed with, it
+  // has to be computed again: another version was activated meanwhile, or the
+  // prior changed, and the segment was not among those to be scored again.
+  ScoreBasis basis;
   std::optional<StoredRun> started_run;  // the trigger fired
   std::optional<StoredChange> change;    // was detected
 };

@@ -146,7 +146,7 @@ void ScoringWorkers::ReturnPlace(const std::string& rig) {
 absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
     const std::string& rig,
     const std::function<absl::StatusOr<QuarantineCommit>()>& change) {
-  std::set<std::pair<std::string, std::int64_t>> claimed;
+  decltype(claimed_) claimed;
   {
     const std::lock_guard lock(mutex_);
     changing_.insert(rig);
@@ -173,7 +173,7 @@ absl::Status ScoringWorkers::Delete(
     changed_.wait(lock, [&] {
       const auto first =
           claimed_.lower_bound({rig, std::numeric_limits<std::int64_t>::min()});
-      return first == claimed_.end() || first->first != rig;
+      return first == claimed_.end() || first->first.first != rig;
     });
   }
   const absl::StatusOr<int> waiting = change();
@@ -213,7 +213,7 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
       continue;
     }
     if (std::optional<Claim> next = Choose(*unscored)) {
-      claimed_.emplace(next->rig, next->sequence);
+      claimed_.emplace(std::pair(next->rig, next->sequence), next->of_rig);
       return next;
     }
     changed_.wait(lock, [&] { return !running_ || arrivals_ != seen; });
@@ -233,7 +233,7 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::Choose(
       continue;
     }
     const std::optional<RigClaim> rig = claims_->Find(candidate.rig);
-    if (!rig) continue;
+    if (!rig || IsScoredUnderAnother(*rig)) continue;
     claims.push_back({candidate.rig, *rig, candidate.key, candidate.sequence});
     // The time of a score grows with the number of readings.
     pieces.push_back({candidate.rig, static_cast<double>(candidate.readings)});
@@ -241,6 +241,18 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::Choose(
   const std::optional<std::size_t> next = order_.Take(pieces);
   if (!next) return std::nullopt;
   return claims[*next];
+}
+
+// The score of an older segment would be refused, and it be scored once more,
+// after this one.
+bool ScoringWorkers::IsScoredUnderAnother(const RigClaim& claim) const {
+  for (auto scored = claimed_.lower_bound(
+           {claim.rig, std::numeric_limits<std::int64_t>::min()});
+       scored != claimed_.end() && scored->first.first == claim.rig;
+       ++scored) {
+    if (scored->second != claim) return true;
+  }
+  return false;
 }
 
 void ScoringWorkers::Process(const Claim& claim) {
@@ -282,7 +294,9 @@ absl::StatusOr<ScoringWorkers::Score> ScoringWorkers::TryScore(
                            store_->GetSegmentData(claim.rig, claim.key));
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
                            store_->GetActiveCalibration(claim.rig));
-  Score score{estimators_.score(rig.rig, active.theta, segment), std::nullopt};
+  Score score{estimators_.score(rig.rig, active.theta, segment),
+              std::nullopt,
+              {active.version, PriorSigmas(rig.rig)}};
   if (estimators_.ends) {
     score.ends = estimators_.ends(rig.rig, active.theta, segment);
   }
@@ -296,7 +310,7 @@ bool ScoringWorkers::WaitForTurn(const Claim& claim) {
   std::unique_lock lock(mutex_);
   const auto is_oldest = [&] {
     const auto oldest = claimed_.lower_bound({claim.rig, 0});
-    return oldest->second == claim.sequence;
+    return oldest->first.second == claim.sequence;
   };
   changed_.wait(lock, [&] { return !running_ || is_oldest(); });
   return is_oldest();
@@ -332,7 +346,34 @@ absl::Status ScoringWorkers::TryCommit(const Claim& claim, const Score& score) {
   if (commit.started_run) {
     on_run_(*commit.started_run);
   }
+  if (commit.basis != score.basis) ScoreAgain(claim);
   return absl::OkStatus();
+}
+
+void ScoringWorkers::ScoreAgain(const Claim& claim) {
+  constexpr int kMostActivations = 3;  // meanwhile
+  absl::Status status;
+  for (int i = 0; i < kMostActivations; ++i) {
+    const auto score = FindScore(claim);
+    if (!score) return;
+    status = score->status();
+    // Its data is gone if nothing needs it.
+    if (absl::IsFailedPrecondition(status)) return;
+    if (!status.ok()) break;
+    if (!(*score)->ends) return;
+    status = Retry([&] {
+      return domain_->ReplaceScore(claim.of_rig,
+                                   (*score)->basis.active,
+                                   claim.key,
+                                   (*score)->information,
+                                   *(*score)->ends);
+    });
+    if (!absl::IsFailedPrecondition(status)) break;
+  }
+  if (status.ok()) return;
+  spdlog::warn("{} keeps the score that it had before: {}",
+               Name(claim.rig, claim.key),
+               status.ToString());
 }
 
 void ScoringWorkers::Quarantine(const Claim& claim, const absl::Status& why) {

@@ -87,6 +87,7 @@ class ScoringWorkers {
   struct Score {
     SegmentInformation information;
     std::optional<SegmentEnds> ends;
+    ScoreBasis basis;  // that it was computed with
   };
 
   void Run();
@@ -94,6 +95,9 @@ class ScoringWorkers {
   // Returns which of the unscored segments, oldest first, to score next. The
   // lock must be held.
   std::optional<Claim> Choose(const std::vector<Store::Unscored>& unscored);
+  // True if a segment of the rig is being scored under another claim of it. The
+  // lock must be held.
+  bool IsScoredUnderAnother(const RigClaim& claim) const;
   void ReturnPlacesOfOthers();
   // Segments of the rig may be claimed again; so many that waited for their
   // scores no longer do.
@@ -107,6 +111,8 @@ class ScoringWorkers {
   bool WaitForTurn(const Claim& claim);
   void Commit(const Claim& claim, const absl::StatusOr<Score>& score);
   absl::Status TryCommit(const Claim& claim, const Score& score);
+  // Computes a score again that was committed with an outdated basis.
+  void ScoreAgain(const Claim& claim);
   void Quarantine(const Claim& claim, const absl::Status& why);
   // Repeats the call until it succeeds or fails for good; when stopping,
   // returns the last result.
@@ -131,7 +137,9 @@ class ScoringWorkers {
   std::int64_t arrivals_ = 0;  // reasons to look for segments, since the start
   std::map<std::string, std::int64_t> filled_;  // places in the backlog, by rig
   FairOrder order_;
-  std::set<std::pair<std::string, std::int64_t>> claimed_;  // rig, sequence
+  // Rig and sequence of the segments that are being scored, and the claim of
+  // their rig under which they are.
+  std::map<std::pair<std::string, std::int64_t>, RigClaim> claimed_;
   // Rigs whose segments are being quarantined or deleted: no further one of
   // them is claimed.
   std::multiset<std::string> changing_;

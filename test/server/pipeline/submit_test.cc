@@ -126,6 +126,22 @@ TEST_F(SubmitTest, ManySaturatedReadingsRejectTheSegment) {
             std::string::npos);
 }
 
+TEST_F(SubmitTest, ManySaturatedReadingsOfASecondImuNameIt) {
+  CreateRig();
+  StartOne();
+  MotionSegment segment = Segment(0);
+  segment.imu1 = segment.imu;
+  for (std::size_t k = 0; k < segment.imu1.size(); k += 10) {
+    segment.imu1[k].gyro.x() = 90;
+  }
+  const auto result = pipeline_->Submit("a", segment, nullptr);
+  ASSERT_TRUE(result.ok()) << result.status();
+  ASSERT_EQ(result->violations.size(), 1u);
+  EXPECT_EQ(result->violations[0].field, "imu1");
+  EXPECT_NE(result->violations[0].message.find("imu1.gyro_max"),
+            std::string::npos);
+}
+
 TEST_F(SubmitTest, ManyObservationsOutsideTheImageRejectTheSegment) {
   CreateRig();
   StartOne();
@@ -223,6 +239,38 @@ TEST_F(SubmitTest, WhoWaitsLongestIsNext) {
   ASSERT_TRUE(AllScored());
   pipeline_->Stop();
   EXPECT_THAT(scored, ::testing::ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8));
+}
+
+// A change of the prior scores kept segments again; this one is not among them.
+TEST_F(SubmitTest, AScoreOfAnOutdatedPriorIsComputedAgain) {
+  CreateRig();
+  const auto gate = std::make_shared<std::mutex>();
+  const auto begun = std::make_shared<std::atomic<int>>(0);
+  std::unique_lock hold(*gate);
+  estimators_.score = [=](const Rig& rig, const auto&, const auto&) {
+    ++*begun;
+    const std::lock_guard wait(*gate);
+    return FakeInformation(rig, rig.prior_sigmas.empty() ? 5.0 : 3.0);
+  };
+  estimators_.ends = CoreEstimators().ends;
+  StartOne();
+  EXPECT_EQ(Submit(0), SubmitVerdict::kStored);
+  ASSERT_TRUE(Eventually([&] { return *begun == 1; }));
+  const auto updated = domain_->UpdateRig(
+      "a",
+      [](StoredRig rig) -> absl::StatusOr<StoredRig> {
+        rig.rig.prior_sigmas = {{"cam0.focal.*", 3.0}};
+        return rig;
+      },
+      "operator");
+  ASSERT_TRUE(updated.ok()) << updated.status();
+  hold.unlock();
+  EXPECT_TRUE(Eventually([&] {
+    const auto tables = store_->GetTables("a");
+    return tables.ok() && (*tables)[0].entries.size() == 1 &&
+           (*tables)[0].entries[0].entropy == 3.0;
+  }));
+  EXPECT_EQ(*begun, 2);
 }
 
 }  // namespace
