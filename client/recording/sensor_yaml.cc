@@ -84,7 +84,12 @@ CameraCalibration ParseCamera(const YAML::Node& yaml) {
               static_cast<std::size_t>(DistortionSize(camera.model)));
   camera.distortion = Eigen::Map<const Eigen::VectorXd>(
       k.data(), static_cast<Eigen::Index>(k.size()));
-  camera.time_offset_s = yaml["time_offset_s"].as<double>(0);
+  if (yaml["time_offset_s"]) {
+    camera.time_offset_s = yaml["time_offset_s"].as<double>();
+    if (!std::isfinite(camera.time_offset_s)) {
+      throw std::runtime_error("time_offset_s is not finite");
+    }
+  }
   return camera;
 }
 

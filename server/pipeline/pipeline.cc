@@ -8,6 +8,7 @@
 #include <exception>
 #include <future>
 #include <memory>
+#include <tuple>
 #include <utility>
 
 #include "core/calibration/settled_ends.h"
@@ -95,14 +96,18 @@ absl::StatusOr<SegmentInformation> ScoreByCore(
   }
 }
 
-SubmitResult TooSaturated(std::size_t samples, std::size_t saturated) {
+// `imu`: "imu", or "imu1" for the second one.
+SubmitResult TooSaturated(const char* imu,
+                          std::size_t samples,
+                          std::size_t saturated) {
   return {SubmitResult::Verdict::kRejected,
-          {{"imu",
-            fmt::format("{} of {} readings are at or beyond the full scale; "
+          {{imu,
+            fmt::format("{0} of {1} readings are at or beyond the full scale; "
                         "send rad/s and m/s^2, and state the range of the "
-                        "sensors as imu.gyro_max and imu.accel_max of the rig",
+                        "sensors as {2}.gyro_max and {2}.accel_max of the rig",
                         saturated,
-                        samples)}}};
+                        samples,
+                        imu)}}};
 }
 
 // Connects the three kinds of threads, and does on the caller's thread what
@@ -199,12 +204,13 @@ class PipelineImpl : public Pipeline {
     const std::size_t stray =
         CountStrayObservations(segment, factory, options_.limits);
     std::size_t saturated = 0;
-    for (const auto& [samples, limit] :
-         {std::pair(SamplesBetweenKeyframes(segment), full_scale),
-          std::pair(SecondSamplesBetweenKeyframes(segment), second_scale)}) {
+    for (const auto& [imu, samples, limit] :
+         {std::tuple("imu", SamplesBetweenKeyframes(segment), full_scale),
+          std::tuple(
+              "imu1", SecondSamplesBetweenKeyframes(segment), second_scale)}) {
       const std::size_t of_imu = CountSaturatedReadings(samples, limit);
       if (IsTooSaturated(samples, of_imu)) {
-        return done(TooSaturated(samples.size(), of_imu));
+        return done(TooSaturated(imu, samples.size(), of_imu));
       }
       saturated += of_imu;
     }

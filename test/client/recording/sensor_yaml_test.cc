@@ -59,6 +59,9 @@ TEST(SensorYaml, WhatIsWrongIsNamed) {
       {"[458.6", "[x", "intrinsics is not a list of numbers"},
       {"458.6", ".nan", "intrinsics has a number that is not finite"},
       {"radial-tangential", "brown", "distortion_model 'brown' is not known"},
+      {"sensor_type: camera",
+       "time_offset_s: .nan",
+       "time_offset_s is not finite"},
       {", 1.8e-05", "", "distortion_coefficients has 3 numbers instead of 4"},
       {"1.0, 0.0, 0.0, 0.2",
        "2.0, 0.0, 0.0, 0.2",
@@ -66,6 +69,8 @@ TEST(SensorYaml, WhatIsWrongIsNamed) {
   for (const auto& [from, to, message] : wrong) {
     EXPECT_EQ(ParseCameraYaml(With(from, to)).status().message(), message);
   }
+  EXPECT_FALSE(
+      ParseCameraYaml(With("sensor_type: camera", "time_offset_s: 5ms")).ok());
   EXPECT_FALSE(ParseCameraYaml("").ok());
   EXPECT_FALSE(ParseCameraYaml("%YAML:1.0").ok());
   EXPECT_FALSE(ParseCameraYaml("a: [").ok());
