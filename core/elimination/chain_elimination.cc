@@ -1,6 +1,8 @@
 #include "core/elimination/chain_elimination.h"
 
 #include <algorithm>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "core/elimination/chain_places.h"
@@ -12,6 +14,12 @@ using namespace chain;
 
 void ChainElimination::Start(const ChainShape& shape, Record record) {
   structure_.Find(shape.keyframes, shape.tracks, shape.track_keyframes);
+  if (shape.max_bytes > 0 && structure_.Bytes() > shape.max_bytes) {
+    throw std::length_error(
+        "tracks connect " + std::to_string(structure_.max_slots()) +
+        " keyframes, which takes too much memory: send fewer keyframes in a "
+        "segment");
+  }
   layout_ = ChainLayout(shape);
   landmark_equations_.Start(shape, structure_, layout_);
   keyframe_equations_.Start(layout_, shape.keyframes);

@@ -82,6 +82,7 @@ class ChainElimination {
 
   // Begins a chain. Use Record::kSteps if steps will be requested later.
   enum class Record { kNothing, kSteps };
+  // Throws std::length_error if the tracks take more than shape.max_bytes.
   void Start(const ChainShape& shape, Record record = Record::kNothing);
 
   // Takes over the memory of `finished`, after its Finish(), that it would need

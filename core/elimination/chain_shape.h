@@ -24,6 +24,8 @@ struct ChainShape {
   std::span<const int> kept_landmarks = {};
   // Number of unknowns of a keyframe besides its pose.
   int motion_size = kChainMotionSize;
+  // Most that the tracks may take, as ChainStructure::Bytes; 0: no limit.
+  std::size_t max_bytes = 0;
 };
 
 }  // namespace selfcal

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/elimination/chain_unknowns.h"
+
 namespace selfcal {
 namespace {
 
@@ -83,6 +85,21 @@ void ChainStructure::Find(int keyframe_count,
     poses_begin_.push_back(static_cast<int>(poses_.size()));
     max_slots_ = std::max(max_slots_, static_cast<int>(front_.size()) - k);
   }
+}
+
+std::size_t ChainStructure::Bytes() const {
+  const auto poses_of = [](int slots) {
+    return sizeof(double) * kChainPoseSize * static_cast<std::size_t>(slots);
+  };
+  std::size_t panels = 0;
+  for (int k = 0; k < keyframes(); ++k) {
+    const std::span<const int> group = Landmarks(k);
+    if (group.empty()) continue;
+    panels =
+        std::max(panels, 3 * group.size() * poses_of(Slots(group.front())));
+  }
+  return panels + kChainPoseSize * static_cast<std::size_t>(max_slots_) *
+                      poses_of(max_slots_);
 }
 
 }  // namespace selfcal

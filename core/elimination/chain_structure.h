@@ -9,6 +9,7 @@
 // places are in order of time.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -25,6 +26,10 @@ class ChainStructure {
 
   int keyframes() const { return static_cast<int>(poses_begin_.size()) - 1; }
   int max_slots() const { return max_slots_; }
+  // What the elimination takes for the poses that are in the front at once, and
+  // for the landmarks that are eliminated with one keyframe: it grows with the
+  // square of the length of the tracks.
+  std::size_t Bytes() const;
 
   // The landmarks that are eliminated with keyframe k, those with most slots
   // first.

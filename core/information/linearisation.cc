@@ -11,6 +11,10 @@
 namespace selfcal {
 namespace {
 
+// Of the tracks of a segment (ChainShape): enough for tracks through 600
+// keyframes, and little beside what a daemon may use.
+constexpr std::size_t kMaxTrackBytes = std::size_t{128} << 20;
+
 // The gauge is also a prior: the rest of the problem does not depend on it, so
 // any proper prior is equivalent to removing its four directions. This sigma
 // keeps the numbers near those of the inertial factors.
@@ -179,14 +183,14 @@ void SegmentLineariser::StartChain(const Rig& rig,
     cameras_.push_back(RowsOf(camera));
   }
   FindTracks(segment, selection, order);
-  elimination_.Start(
-      {.keyframes = static_cast<int>(segment.keyframes.size()),
-       .link_size = LinkTangentSize(theta0),
-       .cameras = cameras_,
-       .tracks = tracks_,
-       .track_keyframes = track_keyframes_,
-       .kept = kept,
-       .motion_size = StateTangentSize(theta0) - kChainPoseSize});
+  elimination_.Start({.keyframes = static_cast<int>(segment.keyframes.size()),
+                      .link_size = LinkTangentSize(theta0),
+                      .cameras = cameras_,
+                      .tracks = tracks_,
+                      .track_keyframes = track_keyframes_,
+                      .kept = kept,
+                      .motion_size = StateTangentSize(theta0) - kChainPoseSize,
+                      .max_bytes = kMaxTrackBytes});
   LineariseViews(rig,
                  theta0,
                  segment,

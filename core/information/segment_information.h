@@ -104,6 +104,9 @@ struct ScoreOptions {
 // components that the rig holds fixed. If the fit of the segment exceeds
 // kOrdinaryFit, both are divided by the square of the excess.
 //
+// Throws std::length_error if tracks connect so many keyframes that this would
+// take too much memory (about 650; then send fewer in a segment).
+//
 // Implemented by SegmentScorer: inliers (InlierSelector), linearisation and
 // elimination (SegmentLineariser, over ChainElimination), scores (GroupScorer).
 SegmentInformation ScoreSegment(const Rig& rig,

@@ -434,5 +434,25 @@ TEST(ScoreSegment, InformationIsReducedIfTheSegmentDoesNotFit) {
   }
 }
 
+// Memory grows with the square of the length of tracks.
+TEST(ScoreSegment, TracksThroughTooManyKeyframesAreRefused) {
+  const Rig rig = HandheldRig("a");
+  SimulationOptions options;
+  options.keyframe_rate_hz = 100;
+  options.landmarks_in_view = 20;
+  options.mean_track_length = 1e6;
+  options.keyframes_per_segment = 300;
+  ExpectFinite(
+      ScoreSegment(rig, rig.factory, TrueSegment(rig, *MakeRest(4), options)));
+  options.keyframes_per_segment = 800;
+  const MotionSegment longer = TrueSegment(rig, *MakeRest(9), options);
+  try {
+    ScoreSegment(rig, rig.factory, longer);
+    FAIL() << "scored";
+  } catch (const std::length_error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("send fewer keyframes"));
+  }
+}
+
 }  // namespace
 }  // namespace selfcal
