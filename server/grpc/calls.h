@@ -12,6 +12,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 
 #include "server/access/grants.h"
 #include "server/api/api.h"
@@ -29,6 +30,7 @@ struct CallContext {
   CallThreads* threads = nullptr;
   ReadGate* reads = nullptr;
   MemoryPool* work = nullptr;  // for what requests become
+  std::int64_t max_request_bytes = 64 << 20;
   WatchSender* watches = nullptr;
   std::chrono::milliseconds max_write_time{60'000};  // of one response
   int max_exchanges = 256;                           // at once
@@ -38,10 +40,6 @@ struct CallContext {
 // Limit on the requests of one exchange that are read and not yet answered:
 // enough to fill a commit while another is being written to disk.
 inline constexpr int kReadAhead = 4;
-
-// What a request needs in bytes, for each of its own, while it is parsed,
-// converted, and packed to be stored.
-inline constexpr std::int64_t kWorkPerByte = 4;
 
 using Rpc = grpc::CallbackServerContext;
 

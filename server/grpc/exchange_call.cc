@@ -12,6 +12,7 @@
 #include "server/grpc/caller.h"
 #include "server/grpc/calls.h"
 #include "server/grpc/status.h"
+#include "server/grpc/take_request.h"
 
 namespace selfcal::server {
 namespace {
@@ -26,10 +27,8 @@ using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
 class ExchangeCall final : public Reactor {
  public:
   ExchangeCall(const CallContext& context, const Method& method, const Rpc& rpc)
-      : method_(method),
-        reads_(context.reads),
-        work_(context.work),
-        exchanges_(context.exchanges),
+      : context_(context),
+        method_(method),
         call_{CallerOf(rpc, context.local_role),
               [this] { return gone_.load(); }},
         exchange_(std::get<ExchangeHandler>(method.handler)(call_)) {
@@ -63,7 +62,7 @@ class ExchangeCall final : public Reactor {
   }
 
   void OnDone() override {
-    --*exchanges_;
+    --*context_.exchanges;
     delete this;
   }
 
@@ -87,7 +86,8 @@ class ExchangeCall final : public Reactor {
       } else if (!reading_ && !closed_ && !Ending() &&
                  answers_.size() < kReadAhead) {
         lock.unlock();
-        auto admitted = reads_->Enter(last_bytes_, [this] { return !Goes(); });
+        auto admitted =
+            context_.reads->Enter(last_bytes_, [this] { return !Goes(); });
         lock.lock();
         if (!admitted) continue;
         admitted_ = *std::move(admitted);
@@ -129,14 +129,12 @@ class ExchangeCall final : public Reactor {
 
   void Take(Slot* slot) {
     last_bytes_ = static_cast<std::int64_t>(bytes_.Length());
-    auto work =
-        work_->Acquire(kWorkPerByte * last_bytes_, [this] { return !Goes(); });
-    if (!work) return Fill(slot, absl::CancelledError(""), *method_.response);
     const std::unique_ptr<Message> request(method_.request->New());
-    const absl::Status parsed = Parse(bytes_, request.get());
+    auto work = TakeRequest(
+        context_, bytes_, [this] { return !Goes(); }, request.get());
     bytes_.Clear();
     admitted_.End();
-    if (!parsed.ok()) return Fill(slot, parsed, *method_.response);
+    if (!work.ok()) return Fill(slot, work.status(), *method_.response);
     slot->work = *std::move(work);
     exchange_->Take(
         *request,
@@ -176,10 +174,8 @@ class ExchangeCall final : public Reactor {
     return &first.response;
   }
 
+  const CallContext context_;
   const Method& method_;
-  ReadGate* const reads_;
-  MemoryPool* const work_;
-  std::atomic<int>* const exchanges_;
   std::atomic<bool> gone_ = false;  // the caller has disconnected
   const Call call_;
   const std::unique_ptr<Exchange> exchange_;  // of the thread

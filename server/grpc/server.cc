@@ -141,6 +141,7 @@ class GrpcServer final : public Server {
                               &threads_,
                               &reads_,
                               &work_,
+                              options.max_receive_bytes,
                               &watches_,
                               options.max_write_time,
                               options.max_segment_streams,

@@ -10,6 +10,7 @@
 #include "server/grpc/caller.h"
 #include "server/grpc/calls.h"
 #include "server/grpc/status.h"
+#include "server/grpc/take_request.h"
 
 namespace selfcal::server {
 namespace {
@@ -20,16 +21,18 @@ class StreamingCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
                 const Method& method,
                 Rpc* rpc,
                 const grpc::ByteBuffer& request)
-      : method_(method),
+      : context_(context),
+        method_(method),
         rpc_(rpc),
-        max_write_time_(context.max_write_time),
         call_{CallerOf(*rpc, context.local_role),
               [this] { return gone_.load(); }},
         request_(request) {}
 
   void Run() {
     const std::unique_ptr<Message> request(method_.request->New());
-    absl::Status status = Parse(request_, request.get());
+    const auto work = TakeRequest(
+        context_, request_, [this] { return gone_.load(); }, request.get());
+    absl::Status status = work.status();
     if (status.ok()) {
       status = std::get<StreamingHandler>(method_.handler)(
           call_, *request, [this](const Message& response) {
@@ -56,7 +59,7 @@ class StreamingCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
     StartWrite(&bytes_);
     std::unique_lock lock(mutex_);
     const auto is_written = [this] { return written_.has_value(); };
-    if (!done_.wait_for(lock, max_write_time_, is_written)) {
+    if (!done_.wait_for(lock, context_.max_write_time, is_written)) {
       gone_ = true;
       rpc_->TryCancel();  // ends the write
       done_.wait(lock, is_written);
@@ -64,9 +67,9 @@ class StreamingCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
     return *std::exchange(written_, std::nullopt);
   }
 
+  const CallContext context_;
   const Method& method_;
   Rpc* const rpc_;
-  const std::chrono::milliseconds max_write_time_;
   std::atomic<bool> gone_ = false;  // the caller has disconnected
   const Call call_;
   const grpc::ByteBuffer request_;

@@ -6,6 +6,7 @@
 #include "server/grpc/caller.h"
 #include "server/grpc/calls.h"
 #include "server/grpc/status.h"
+#include "server/grpc/take_request.h"
 
 namespace selfcal::server {
 namespace {
@@ -17,21 +18,19 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
             const Rpc& rpc,
             const grpc::ByteBuffer& request,
             grpc::ByteBuffer* response)
-      : method_(method),
+      : context_(context),
+        method_(method),
         call_{CallerOf(rpc, context.local_role),
               [this] { return gone_.load(); }},
-        work_(context.work),
         request_(request),
         response_(response) {}
 
   void Run() {
-    const auto work = work_->Acquire(
-        kWorkPerByte * static_cast<std::int64_t>(request_.Length()),
-        [this] { return gone_.load(); });
     const std::unique_ptr<Message> request(method_.request->New());
     const std::unique_ptr<Message> response(method_.response->New());
-    absl::Status status = work ? Parse(request_, request.get())
-                               : absl::CancelledError("the caller has gone");
+    const auto work = TakeRequest(
+        context_, request_, [this] { return gone_.load(); }, request.get());
+    absl::Status status = work.status();
     request_.Clear();
     if (status.ok()) {
       status = std::get<UnaryHandler>(method_.handler)(
@@ -45,10 +44,10 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   void OnDone() override { delete this; }
 
  private:
+  const CallContext context_;
   const Method& method_;
   std::atomic<bool> gone_ = false;  // the caller has disconnected
   const Call call_;
-  MemoryPool* const work_;
   grpc::ByteBuffer request_;
   grpc::ByteBuffer* const response_;
 };

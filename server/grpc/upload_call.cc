@@ -9,6 +9,7 @@
 #include "server/grpc/caller.h"
 #include "server/grpc/calls.h"
 #include "server/grpc/status.h"
+#include "server/grpc/take_request.h"
 
 namespace selfcal::server {
 namespace {
@@ -19,7 +20,8 @@ class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
              const Method& method,
              const Rpc& rpc,
              grpc::ByteBuffer* response)
-      : method_(method),
+      : context_(context),
+        method_(method),
         call_{CallerOf(rpc, context.local_role),
               [this] { return gone_.load(); }},
         response_(response) {}
@@ -50,15 +52,21 @@ class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
     std::unique_lock lock(mutex_);
     done_.wait(lock, [this] { return read_.has_value(); });
     if (!*std::exchange(read_, std::nullopt)) return false;
-    malformed_ = Parse(bytes_, request);
+    work_.Shrink(0);
+    auto work = TakeRequest(
+        context_, bytes_, [this] { return gone_.load(); }, request);
+    malformed_ = work.status();
+    if (work.ok()) work_ = *std::move(work);
     return malformed_.ok();
   }
 
+  const CallContext context_;
   const Method& method_;
   std::atomic<bool> gone_ = false;  // the caller has disconnected
   const Call call_;
   grpc::ByteBuffer* const response_;
   grpc::ByteBuffer bytes_;  // being read
+  MemoryPool::Share work_;  // of the last request
   absl::Status malformed_;
   std::mutex mutex_;
   std::condition_variable done_;

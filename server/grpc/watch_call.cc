@@ -8,6 +8,7 @@
 #include "server/grpc/caller.h"
 #include "server/grpc/calls.h"
 #include "server/grpc/status.h"
+#include "server/grpc/take_request.h"
 #include "server/grpc/watch_sender.h"
 
 namespace selfcal::server {
@@ -29,7 +30,10 @@ class WatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   // Subscribes, which may block.
   void Start() {
     const std::unique_ptr<Message> request(method_.request->New());
-    absl::Status status = Parse(request_, request.get());
+    absl::Status status =
+        TakeRequest(
+            context_, request_, [this] { return gone_.load(); }, request.get())
+            .status();
     if (status.ok()) status = Subscribe(*request);
     if (!status.ok()) return End(status);
     Schedule();

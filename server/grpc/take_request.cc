@@ -1,0 +1,58 @@
+#include "server/grpc/take_request.h"
+
+#include <fmt/format.h>
+#include <grpcpp/support/proto_buffer_reader.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <new>
+#include <optional>
+
+#include "proto/parsed_size.h"
+#include "server/api/errors.h"
+#include "server/grpc/bytes.h"
+#include "server/status/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// What a request needs in bytes, for each of its own, while it is parsed,
+// converted, and packed to be stored.
+constexpr std::int64_t kWorkPerByte = 4;
+
+std::int64_t ParsedSizeOf(const grpc::ByteBuffer& bytes,
+                          const google::protobuf::Message& type) {
+  grpc::ByteBuffer copy = bytes;  // shares the bytes
+  grpc::ProtoBufferReader reader(&copy);
+  return ParsedSize(*type.GetDescriptor(), &reader);
+}
+
+}  // namespace
+
+absl::StatusOr<MemoryPool::Share> TakeRequest(
+    const CallContext& context,
+    const grpc::ByteBuffer& bytes,
+    const std::function<bool()>& cancelled,
+    google::protobuf::Message* request) {
+  const std::int64_t parsed = ParsedSizeOf(bytes, *request);
+  if (parsed > kWorkPerByte * context.max_request_bytes) {
+    return ForClient(absl::ResourceExhaustedError(fmt::format(
+        "the request has {} bytes, but {} MiB of elements: send fewer of them",
+        bytes.Length(),
+        parsed >> 20)));
+  }
+  std::optional<MemoryPool::Share> work = context.work->Acquire(
+      std::max(kWorkPerByte * static_cast<std::int64_t>(bytes.Length()),
+               parsed),
+      cancelled);
+  if (!work) return absl::CancelledError("the caller has gone");
+  try {
+    SELFCAL_RETURN_IF_ERROR(Parse(bytes, request));
+  } catch (const std::bad_alloc&) {
+    return ForClient(
+        absl::ResourceExhaustedError("memory is short: try again later"));
+  }
+  return *std::move(work);
+}
+
+}  // namespace selfcal::server
