@@ -320,6 +320,13 @@ Violations FromProto(const v1::CalibrationParameters& message,
     Require(message.imu1().has_q_ji(), prefix + "imu1.q_ji", &violations);
     Require(message.imu1().has_p_ji(), prefix + "imu1.p_ji", &violations);
   }
+  if (message.cameras_size() > kMaxCameras) {
+    violations.push_back({prefix + "cameras",
+                          "has " + std::to_string(message.cameras_size()) +
+                              " elements; at most " +
+                              std::to_string(kMaxCameras) + " are allowed"});
+    return violations;
+  }
   read.cameras.resize(message.cameras_size());
   for (int i = 0; i < message.cameras_size(); ++i) {
     ReadCamera(message.cameras(i),

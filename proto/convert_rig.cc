@@ -32,6 +32,13 @@ void ReadBlocks(const v1::Rig& message,
                 const std::string& prefix,
                 Rig* rig,
                 std::vector<Violation>* violations) {
+  if (static_cast<std::size_t>(message.blocks_size()) > kMaxPatterns) {
+    violations->push_back({prefix + "blocks",
+                           "has " + std::to_string(message.blocks_size()) +
+                               " elements; at most " +
+                               std::to_string(kMaxPatterns) + " are allowed"});
+    return;
+  }
   for (const v1::BlockSetting& setting : message.blocks()) {
     if (setting.state() != v1::BlockSetting::ON &&
         setting.state() != v1::BlockSetting::OFF) {

@@ -21,11 +21,12 @@ Eigen::VectorXd WalkDensities(const Rig& rig,
 
 std::vector<Violation> Validate(const Rig& rig,
                                 const std::vector<WalkDensity>& walks) {
-  constexpr std::size_t kMaxWalks = 1024;
-  if (walks.size() > kMaxWalks) {
+  // Keeps squares finite, whatever the age.
+  constexpr double kMostDensity = 1e6;
+  if (walks.size() > kMaxPatterns) {
     return {{"walk_densities",
              "has " + std::to_string(walks.size()) + " elements; at most " +
-                 std::to_string(kMaxWalks) + " are allowed"}};
+                 std::to_string(kMaxPatterns) + " are allowed"}};
   }
   const auto components = TangentComponents(rig.factory);
   std::vector<Violation> violations;
@@ -39,8 +40,8 @@ std::vector<Violation> Validate(const Rig& rig,
                                 components.front().name +
                                 "', or '*' at its begin or end"});
     }
-    if (!(std::isfinite(walks[i].density) && walks[i].density >= 0)) {
-      violations.push_back({path + ".value", "is not a number of at least 0"});
+    if (!(walks[i].density >= 0 && walks[i].density <= kMostDensity)) {
+      violations.push_back({path + ".value", "is not in [0, 1e6]"});
     }
   }
   return violations;

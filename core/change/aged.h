@@ -29,8 +29,8 @@ struct WalkDensity {
 Eigen::VectorXd WalkDensities(const Rig& rig,
                               const std::vector<WalkDensity>& walks);
 
-// Reports patterns that match nothing and densities that are not numbers of at
-// least 0, with paths that begin with "walk_densities". It checks at most 1024.
+// Reports patterns that match nothing and densities outside [0, 1e6], with
+// paths that begin with "walk_densities". It checks at most kMaxPatterns.
 std::vector<Violation> Validate(const Rig& rig,
                                 const std::vector<WalkDensity>& walks);
 

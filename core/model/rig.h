@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ struct ImuNoise {
   double gyro_bias_random_walk = 2e-5;   // [rad/s^2/sqrt(Hz)]
   double accel_bias_random_walk = 3e-3;  // [m/s^3/sqrt(Hz)]
 };
+
+// Most settings by pattern that a rig has of one kind.
+inline constexpr std::size_t kMaxPatterns = 1024;
 
 // A named set of tangent components. A pattern is the name of a component, or
 // has '*' as its first or last character (or both), which matches any text:

@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::size_t kMaxNameLength = 63;
 constexpr std::size_t kMaxGroups = 64;
-constexpr std::size_t kMaxPatterns = 1024;
 constexpr int kMaxTableSize = 10'000;
 constexpr int kMaxViolations = 1000;
 

@@ -1,6 +1,7 @@
 #include <string>
 
 #include "proto/resource_names.h"
+#include "proto/safe_text.h"
 #include "selfcal/v1/uplink.pb.h"
 #include "server/access/rules.h"
 #include "server/api/errors.h"
@@ -45,7 +46,7 @@ absl::StatusOr<DeviceReport> ReadReport(const v1::ReportRequest& request) {
       return BadName("results.name", request.rig() + "/instructions/{n}");
     }
     report.results.push_back(
-        {*number, result.refused(), result.message().substr(0, kMaxMessage)});
+        {*number, result.refused(), SafeLine(result.message(), kMaxMessage)});
   }
   return report;
 }

@@ -20,6 +20,7 @@
 #include "server/store/payload.h"
 #include "server/store/replicas.h"
 #include "server/store/report.h"
+#include "server/store/report_check.h"
 #include "server/store/rig_lists.h"
 #include "server/store/rig_work.h"
 #include "server/store/rigs.h"
@@ -137,14 +138,21 @@ class DatabaseStore final : public Store {
 
   absl::StatusOr<MotionSegment> GetSegmentData(const std::string& rig,
                                                const SegmentKey& key) override {
-    SELFCAL_ASSIGN_OR_RETURN(const Payload payload, Read([&](Connection* db) {
-                               return ReadPayload(db, rig, key);
-                             }));
+    std::optional<Calibration> of_device;
+    SELFCAL_ASSIGN_OR_RETURN(
+        const Payload payload,
+        Read([&](Connection* db) -> absl::StatusOr<Payload> {
+          SELFCAL_ASSIGN_OR_RETURN(of_device, FactoryIfReported(db, rig));
+          return ReadPayload(db, rig, key);
+        }));
     const std::string what = SegmentText(rig, key);
     SELFCAL_ASSIGN_OR_RETURN(MotionSegment segment,
                              UnpackSegment(payload, what));
     if (segment.key != key) {
       return OfAnotherSegment("the data of " + what, rig, segment.key);
+    }
+    if (of_device) {
+      SELFCAL_RETURN_IF_ERROR(CheckReported(segment, what, *of_device));
     }
     return segment;
   }

@@ -1,6 +1,7 @@
 #include "server/store/payload.h"
 
 #include <fmt/format.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <zstd.h>
 
 #include <array>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include "proto/convert.h"
+#include "proto/parsed_size.h"
 #include "server/status/status_macros.h"
 #include "server/store/checksum.h"
 
@@ -21,6 +23,11 @@ constexpr int kCompressionLevel = -1;
 // More than a segment within SegmentLimits can need, and less than a message
 // can hold.
 constexpr std::int64_t kMaxRawBytes = std::int64_t{1} << 30;
+
+// Most that the message of a segment takes in memory, for each of its bytes
+// (ParsedSize), and besides.
+constexpr std::int64_t kMostParsed = 4;
+constexpr std::int64_t kLeastParsed = 1 << 16;
 
 absl::Status Damaged(const std::string& what) {
   return absl::DataLossError(fmt::format(
@@ -106,10 +113,17 @@ absl::StatusOr<MotionSegment> UnpackSegment(const Payload& payload,
   std::string raw(static_cast<std::size_t>(payload.raw_bytes), '\0');
   const std::size_t size = ZSTD_decompress(
       raw.data(), raw.size(), payload.data.data(), payload.data.size());
+  if (ZSTD_isError(size) || size != raw.size()) return Damaged(what);
+  google::protobuf::io::ArrayInputStream stream(raw.data(),
+                                                static_cast<int>(raw.size()));
+  // Many more elements than content are no segment.
+  if (ParsedSize(*v1::MotionSegment::descriptor(), &stream) >
+      kMostParsed * payload.raw_bytes + kLeastParsed) {
+    return Damaged(what);
+  }
   v1::MotionSegment message;
   MotionSegment segment;
-  if (ZSTD_isError(size) || size != raw.size() ||
-      !message.ParseFromString(raw) ||
+  if (!message.ParseFromString(raw) ||
       !FromProto(message, "", &segment).empty()) {
     return Damaged(what);
   }

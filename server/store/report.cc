@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/change/aged.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "proto/label_text.h"
@@ -20,6 +21,7 @@
 #include "server/store/events.h"
 #include "server/store/inventory.h"
 #include "server/store/records.h"
+#include "server/store/report_check.h"
 #include "server/store/reported_rows.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
@@ -51,6 +53,27 @@ absl::Status BadReport(const std::string& why) {
 absl::Status Contradiction(const std::string& what) {
   return absl::FailedPreconditionError(
       fmt::format("the report contradicts the records of the hub: {}", what));
+}
+
+// What is needed to write the records of one report.
+struct Application {
+  UnitOfWork* tx;
+  const AdmitData& admit_data;
+  // The factory calibration, once it was read.
+  std::optional<Calibration> factory = std::nullopt;
+};
+
+absl::Status ReadFactory(Application* to) {
+  if (to->factory) return absl::OkStatus();
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig stored, ReadRig(to->tx));
+  to->factory = stored.rig.factory;
+  return absl::OkStatus();
+}
+
+// Names what was reported in an error of report_check.h.
+absl::Status About(const std::string& what, const absl::Status& checked) {
+  if (checked.ok()) return checked;
+  return BadReport(fmt::format("{}: {}", what, std::string(checked.message())));
 }
 
 absl::StatusOr<store::ReportedRecords> Parse(const std::string& bytes) {
@@ -102,9 +125,13 @@ absl::Status CheckLabels(const StoredRig& rig) {
   return absl::OkStatus();
 }
 
-absl::Status ApplyRig(UnitOfWork* tx, const Rows& rows) {
+absl::Status ApplyRig(Application* to, const Rows& rows) {
+  UnitOfWork* const tx = to->tx;
   const ReportedRow* row = RowOf(rows, "rigs");
   if (row == nullptr) return BadReport("a rig has no definition");
+  SELFCAL_RETURN_IF_ERROR(
+      About("the rig", CheckReportedTime(row->Of("create_time_ns").integer())));
+  SELFCAL_RETURN_IF_ERROR(ReadFactory(to));
   SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
                                     "UPDATE rigs SET create_time_ns = ?2, "
                                     "  definition = ?3, sha256 = ?4 "
@@ -118,7 +145,15 @@ absl::Status ApplyRig(UnitOfWork* tx, const Rows& rows) {
   if (stored.rig.id != tx->rig()) {
     return BadReport(fmt::format("it defines the rig {}", stored.rig.id));
   }
-  const std::vector<Violation> violations = Validate(stored.rig);
+  // What is stored was computed with it.
+  if (!SameShape(stored.rig.factory, *to->factory)) {
+    return Contradiction("the rig has other sensors or parameters");
+  }
+  to->factory = stored.rig.factory;
+  std::vector<Violation> violations = Validate(stored.rig);
+  if (violations.empty()) {
+    violations = Validate(stored.rig, stored.policy.walk_densities);
+  }
   if (!violations.empty()) {
     return BadReport(fmt::format("{} of the rig {}",
                                  violations.front().field,
@@ -146,11 +181,14 @@ absl::Status DeleteOther(UnitOfWork* tx,
   return other == 0 ? absl::OkStatus() : DeleteSegmentAlone(tx, other);
 }
 
-absl::Status ApplySegment(UnitOfWork* tx,
+absl::Status ApplySegment(Application* to,
                           const Record& record,
                           const Rows& rows) {
+  UnitOfWork* const tx = to->tx;
   const ReportedRow* row = RowOf(rows, "segments");
   if (row == nullptr) return DeleteSegmentAlone(tx, record.number());
+  SELFCAL_RETURN_IF_ERROR(About(
+      "a segment", CheckReportedTime(row->Of("receive_time_ns").integer())));
   const SegmentKey key{row->Of("session").text(),
                        row->Of("session_index").integer()};
   Statement before(tx->db(),
@@ -171,13 +209,22 @@ absl::Status ApplySegment(UnitOfWork* tx,
                                     tx->rig_row(),
                                     row->Of("receive_time_ns").integer())
                               .Run());
-  return ReadSegment(tx, key).status();
+  SELFCAL_ASSIGN_OR_RETURN(const StoredSegment written, ReadSegment(tx, key));
+  if (!written.information) return absl::OkStatus();
+  SELFCAL_RETURN_IF_ERROR(ReadFactory(to));
+  return About(SegmentText(tx->rig(), key),
+               CheckReported(*written.information, *to->factory));
 }
 
 absl::Status ApplyRun(UnitOfWork* tx, const Record& record, const Rows& rows) {
   if (rows.empty()) return BadReport("a run is gone");
   SELFCAL_RETURN_IF_ERROR(ReplaceRows(tx, record, rows));
-  SELFCAL_RETURN_IF_ERROR(ReadRun(tx, record.number()).status());
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun written,
+                           ReadRun(tx, record.number()));
+  for (const std::int64_t time_ns :
+       {written.create_time_ns, written.end_time_ns}) {
+    SELFCAL_RETURN_IF_ERROR(About("a run", CheckReportedTime(time_ns)));
+  }
   return AnnounceRun(tx, record.number());
 }
 
@@ -221,9 +268,10 @@ absl::Status InsertVersion(UnitOfWork* tx,
   return absl::OkStatus();
 }
 
-absl::Status ApplyCalibration(UnitOfWork* tx,
+absl::Status ApplyCalibration(Application* to,
                               const Record& record,
                               const Rows& rows) {
+  UnitOfWork* const tx = to->tx;
   const std::int64_t version = record.number();
   const ReportedRow* row = RowOf(rows, "calibrations");
   if (row == nullptr) return BadReport("a calibration is gone");
@@ -256,12 +304,11 @@ absl::Status ApplyCalibration(UnitOfWork* tx,
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration written,
                            ReadCalibration(tx, version));
-  // A value that is no number would spoil what is computed over all rigs.
-  if (!ReadableValues(written.theta).allFinite() ||
-      !written.covariance.allFinite()) {
-    return BadReport(
-        fmt::format("version {} has values that are no numbers", version));
-  }
+  SELFCAL_RETURN_IF_ERROR(ReadFactory(to));
+  const std::string what = fmt::format("version {}", version);
+  SELFCAL_RETURN_IF_ERROR(
+      About(what, CheckReportedTime(written.create_time_ns)));
+  SELFCAL_RETURN_IF_ERROR(About(what, CheckReported(written, *to->factory)));
   return is_there ? absl::OkStatus() : InsertEstimates(tx, written);
 }
 
@@ -270,6 +317,8 @@ absl::Status ApplyActivation(UnitOfWork* tx,
                              const Rows& rows) {
   const ReportedRow* row = RowOf(rows, "activations");
   if (row == nullptr) return BadReport("an activation is gone");
+  SELFCAL_RETURN_IF_ERROR(
+      About("an activation", CheckReportedTime(row->Of("time_ns").integer())));
   const std::int64_t version = row->Of("version").integer();
   Statement before(tx->db(),
                    "SELECT version FROM activations "
@@ -307,6 +356,8 @@ absl::Status ApplyEvent(UnitOfWork* tx,
                         const Rows& rows) {
   const ReportedRow* row = RowOf(rows, "events");
   if (row == nullptr) return BadReport("an event is gone");
+  SELFCAL_RETURN_IF_ERROR(
+      About("an event", CheckReportedTime(row->Of("time_ns").integer())));
   return InsertReportedEvent(
       tx,
       {record.number(),
@@ -317,11 +368,11 @@ absl::Status ApplyEvent(UnitOfWork* tx,
        row->Of("steady_ns").integer()});
 }
 
-// Data that the device does not have any more stays.
-absl::Status ApplyData(UnitOfWork* tx,
+// Data that the device does not have any more stays. It is checked where it is
+// read (Store::GetSegmentData).
+absl::Status ApplyData(Application* to,
                        const Record& record,
-                       const Rows& rows,
-                       const AdmitData& admit_data) {
+                       const Rows& rows) {
   for (const ReportedRow& row : rows) {
     const std::string& data = row.Of("data").blob();
     const std::int64_t raw_bytes = row.Of("raw_bytes").integer();
@@ -330,29 +381,29 @@ absl::Status ApplyData(UnitOfWork* tx,
     }
     SELFCAL_ASSIGN_OR_RETURN(
         const bool admitted,
-        admit_data(static_cast<std::int64_t>(data.size())));
+        to->admit_data(static_cast<std::int64_t>(data.size())));
     if (!admitted) continue;
     SELFCAL_RETURN_IF_ERROR(
-        WriteRow(tx, row, record.number(), OnConflict::kUpdate));
+        WriteRow(to->tx, row, record.number(), OnConflict::kUpdate));
   }
   return absl::OkStatus();
 }
 
-absl::Status ApplyRecord(UnitOfWork* tx,
+absl::Status ApplyRecord(Application* to,
                          const Record& record,
-                         const Rows& rows,
-                         const AdmitData& admit_data) {
+                         const Rows& rows) {
+  UnitOfWork* const tx = to->tx;
   switch (static_cast<RecordKind>(record.kind())) {
     case RecordKind::kRig:
-      return ApplyRig(tx, rows);
+      return ApplyRig(to, rows);
     case RecordKind::kTables:
       return ReplaceRows(tx, record, rows);
     case RecordKind::kSegment:
-      return ApplySegment(tx, record, rows);
+      return ApplySegment(to, record, rows);
     case RecordKind::kRun:
       return ApplyRun(tx, record, rows);
     case RecordKind::kCalibration:
-      return ApplyCalibration(tx, record, rows);
+      return ApplyCalibration(to, record, rows);
     case RecordKind::kActivation:
       return ApplyActivation(tx, record, rows);
     case RecordKind::kChange: {
@@ -364,7 +415,7 @@ absl::Status ApplyRecord(UnitOfWork* tx,
     case RecordKind::kEvent:
       return ApplyEvent(tx, record, rows);
     case RecordKind::kData:
-      return ApplyData(tx, record, rows, admit_data);
+      return ApplyData(to, record, rows);
     case RecordKind::kInventory:
       return ApplyInventory(tx, record);
   }
@@ -444,6 +495,16 @@ absl::StatusOr<std::optional<ReportingDevice>> ReadReportingDevice(
   return device;
 }
 
+absl::StatusOr<std::optional<Calibration>> FactoryIfReported(
+    Connection* db, const std::string& rig) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_row, FindRigId(db, rig));
+  UnitOfWork tx(db, rig, rig_row, 0);
+  SELFCAL_ASSIGN_OR_RETURN(const auto device, ReadReportingDevice(&tx));
+  if (!device) return std::nullopt;
+  SELFCAL_ASSIGN_OR_RETURN(StoredRig stored, ReadRig(&tx));
+  return std::move(stored.rig.factory);
+}
+
 absl::Status WriteReportingDevice(UnitOfWork* tx,
                                   const ReportingDevice& device) {
   return Statement(
@@ -490,13 +551,14 @@ absl::Status ApplyReport(UnitOfWork* tx,
                          const std::string& bytes,
                          const AdmitData& admit_data) {
   SELFCAL_ASSIGN_OR_RETURN(const auto records, Parse(bytes));
+  Application application{tx, admit_data};
   for (const Record& record : records.records()) {
     // The rows of an inventory are of no table.
     Rows rows;
     if (record.kind() != static_cast<int>(RecordKind::kInventory)) {
       SELFCAL_ASSIGN_OR_RETURN(rows, CheckRows(records, record));
     }
-    const absl::Status status = ApplyRecord(tx, record, rows, admit_data);
+    const absl::Status status = ApplyRecord(&application, record, rows);
     if (!status.ok()) return FromDevice(status);
   }
   return absl::OkStatus();

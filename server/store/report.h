@@ -40,6 +40,10 @@ absl::StatusOr<std::optional<ReportingDevice>> ReadReportingDevice(
 absl::Status WriteReportingDevice(UnitOfWork* tx,
                                   const ReportingDevice& device);
 
+// The factory calibration of a rig that a device reports; nullopt for others.
+absl::StatusOr<std::optional<Calibration>> FactoryIfReported(
+    Connection* db, const std::string& rig);
+
 // The attempt that told of the deletion of the rig with this key in the
 // database of a device (Store::EndReports); 0: none. Until the unit of work is
 // committed, none can.

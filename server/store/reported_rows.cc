@@ -60,6 +60,30 @@ void PutValue(const Statement& read, int column, ColumnType type, Value* to) {
   }
 }
 
+// True if the blob of the row is not what its checksum, in a later column,
+// says.
+bool IsDamaged(const ReportedTable& table,
+               const store::ReportedRecords::Row& row) {
+  const std::string* blob = nullptr;
+  for (int c = 0; c < row.values_size(); ++c) {
+    if (table.columns[c].type != ColumnType::kBlob) continue;
+    const std::string& value = row.values(c).blob();
+    if (table.columns[c].name == "sha256") {
+      return blob != nullptr && Sha256(*blob) != value;
+    }
+    blob = &value;
+  }
+  return false;
+}
+
+// The hub would refuse what is damaged, and with it all that follows. Of a
+// segment it is left out, so that the hub has as little of it as the device;
+// anything else that is damaged, the device cannot do without either.
+bool CanBeLeftOut(const ReportedTable& table) {
+  return table.kind == RecordKind::kData ||
+         (table.kind == RecordKind::kSegment && table.name != "segments");
+}
+
 absl::Status PutRows(UnitOfWork* tx,
                      const ReportedTable& table,
                      int index,
@@ -82,6 +106,9 @@ absl::Status PutRows(UnitOfWork* tx,
     int column = 0;
     for (const ReportedColumn& of : table.columns) {
       PutValue(read, column++, of.type, row->add_values());
+    }
+    if (CanBeLeftOut(table) && IsDamaged(table, *row)) {
+      record->mutable_rows()->RemoveLast();
     }
   }
   return read.status();

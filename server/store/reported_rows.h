@@ -24,7 +24,8 @@ absl::StatusOr<std::vector<std::int64_t>> NumbersOf(UnitOfWork* tx,
 
 // Lists the tables in the message, in this order.
 void PutTables(store::ReportedRecords* records);
-// Adds the rows of a record, none if it is gone.
+// Adds the rows of a record, none if it is gone. Damaged data and information
+// of segments are left out.
 absl::Status PutRecord(UnitOfWork* tx,
                        RecordKind kind,
                        std::int64_t number,

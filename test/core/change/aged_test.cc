@@ -76,11 +76,15 @@ TEST_F(AgedTest, ByDefaultAHundredthOfTheReferenceInADay) {
 
 TEST_F(AgedTest, PatternsAndDensitiesAreChecked) {
   EXPECT_TRUE(Validate(rig_, std::vector<WalkDensity>{{"imu.*", 0}}).empty());
-  const auto violations =
-      Validate(rig_, std::vector<WalkDensity>{{"lens.*", 1}, {"imu.*", -1}});
-  ASSERT_EQ(violations.size(), 2u);
+  const auto violations = Validate(
+      rig_,
+      std::vector<WalkDensity>{
+          {"lens.*", 1}, {"imu.*", -1}, {"*", 1e200}, {"*", std::nan("")}});
+  ASSERT_EQ(violations.size(), 4u);
   EXPECT_EQ(violations[0].field, "walk_densities[0].pattern");
   EXPECT_EQ(violations[1].field, "walk_densities[1].value");
+  EXPECT_EQ(violations[2].field, "walk_densities[2].value");
+  EXPECT_EQ(violations[3].field, "walk_densities[3].value");
 }
 
 }  // namespace
