@@ -1,21 +1,27 @@
 #include "client/import/vi_map_files.h"
 
 #include <fmt/format.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/text_format.h>
 #include <zlib.h>
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <utility>
 
 #include "client/import/read_file.h"
+#include "proto/parsed_size.h"
 
 namespace selfcal::client {
 namespace {
 
-// Limit on the size of a part file, far above any real one, as a defence
-// against malicious files.
+// Limits far above any real map, as a defence against malicious files: on the
+// bytes of a part, of all parts, and on what a message takes for each of its
+// bytes.
 constexpr std::size_t kMaxUncompressedBytes = std::size_t{1} << 30;
+constexpr std::int64_t kMaxParsedPerByte = 16;
+constexpr std::int64_t kAlwaysAllowed = std::int64_t{64} << 20;
 
 absl::StatusOr<std::string> Gunzip(const std::string& path) {
   std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"),
@@ -76,6 +82,7 @@ absl::StatusOr<vi_map::ViMap> ReadViMapFiles(const std::string& folder) {
         fmt::format("{}: not a list of map files", metadata_path));
   }
   vi_map::ViMap map;
+  std::size_t bytes = 0;
   for (const vi_map::MapFile& file : files.files()) {
     if (!IsPlainName(file.path())) {
       return absl::InvalidArgumentError(
@@ -85,6 +92,17 @@ absl::StatusOr<vi_map::ViMap> ReadViMapFiles(const std::string& folder) {
     }
     absl::StatusOr<std::string> data = Gunzip(base + file.path());
     if (!data.ok()) return data.status();
+    bytes += data->size();
+    google::protobuf::io::ArrayInputStream stream(
+        data->data(), static_cast<int>(data->size()));
+    if (bytes > kMaxUncompressedBytes ||
+        ParsedSize(*vi_map::ViMap::descriptor(), &stream) >
+            kMaxParsedPerByte * static_cast<std::int64_t>(data->size()) +
+                kAlwaysAllowed) {
+      return absl::InvalidArgumentError(
+          fmt::format("{}: the map would take too much memory; not a map part",
+                      base + file.path()));
+    }
     vi_map::ViMap part;
     if (!part.ParseFromString(*data)) {
       return absl::DataLossError(fmt::format(

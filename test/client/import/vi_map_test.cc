@@ -203,6 +203,14 @@ TEST_F(DamagedMap, PartOutsideTheFolderIsRefused) {
   EXPECT_EQ(ReadError().code(), absl::StatusCode::kInvalidArgument);
 }
 
+// Two bytes each in the file, hundreds in memory.
+TEST_F(DamagedMap, MillionsOfEmptyVerticesAreRefused) {
+  vi_map::ViMap map;
+  for (int i = 0; i < 2'000'000; ++i) map.add_vertices();
+  Write("vertices0", map);
+  EXPECT_THAT(std::string(ReadError().message()), HasSubstr("too much memory"));
+}
+
 TEST_F(DamagedMap, WrongQuaternionNormNamesTheVertex) {
   vi_map::ViMap map = Read("vertices0");
   map.mutable_vertices(3)->set_t_m_i(0, 7.0);
