@@ -22,13 +22,13 @@ using google::protobuf::UnknownFieldSet;
 using google::protobuf::internal::WireFormatLite;
 using google::protobuf::io::CodedInputStream;
 
-// Of each element of its own: its pointer in a list that grows twofold, and the
-// header of its allocation.
+// Overhead of an element that is allocated by itself: its pointer in a list
+// that grows twofold, and the header of its allocation.
 constexpr std::int64_t kOfElement = 2 * sizeof(void*) + 16;
 constexpr std::int64_t kOfString = kOfElement + sizeof(std::string);
 constexpr std::int64_t kOfUnknown =
     2 * sizeof(UnknownField) + sizeof(UnknownFieldSet) + kOfString;
-// As deep as protobuf parses.
+// Depth to which protobuf parses.
 constexpr int kMaxDepth = 100;
 
 // What the fields of one type of message are, by number.
@@ -36,7 +36,7 @@ struct TypeLayout {
   struct Field {
     bool is_known = false;
     const Descriptor* message = nullptr;
-    // Of an element of a list of numbers; such a list grows twofold.
+    // Memory of an element of a list of numbers, which grows twofold.
     std::int64_t number_bytes = 0;
     std::int64_t least_wire_bytes = 1;
   };

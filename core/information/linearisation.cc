@@ -11,7 +11,7 @@
 namespace selfcal {
 namespace {
 
-// Of the tracks of a segment (ChainShape): enough for tracks through 600
+// Limit for the tracks of a segment (ChainShape): enough for tracks through 600
 // keyframes, and little beside what a daemon may use.
 constexpr std::size_t kMaxTrackBytes = std::size_t{128} << 20;
 

@@ -33,7 +33,7 @@ struct ScoreBasis {
 // Result of the commit of a score.
 struct ScoreCommit {
   std::vector<std::string> tables;  // groups it entered
-  // When it was committed. If this is not what the score was computed with, it
+  // Basis at the commit. If this is not what the score was computed with, it
   // has to be computed again: another version was activated meanwhile, or the
   // prior changed, and the segment was not among those to be scored again.
   ScoreBasis basis;

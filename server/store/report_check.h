@@ -25,9 +25,9 @@ absl::Status CheckReported(const StoredCalibration& calibration,
 absl::Status CheckReported(const SegmentInformation& information,
                            const Calibration& factory);
 
-// By the rules for segments that are sent to this program. DATA_LOSS about
-// `what` otherwise: a report is not refused for the data of a segment, which is
-// only unpacked where it is read.
+// Applies the rules for segments that are sent to this program. DATA_LOSS about
+// `what` if it breaks one: a report is not refused for the data of a segment,
+// which is only unpacked where it is read.
 absl::Status CheckReported(const MotionSegment& segment,
                            const std::string& what,
                            const Calibration& factory);

@@ -84,7 +84,7 @@ TEST(ParsedSize, FieldsThatAreNotKnownCount) {
     const std::string bytes = Repeated(field, 1000);
     EXPECT_GE(SizeOf<v1::GetRigRequest>(bytes),
               Actual<v1::GetRigRequest>(bytes));
-    // In a message within, too.
+    // The same in a message within.
     v1::CreateRigRequest request;
     EXPECT_TRUE(request.mutable_rig()->ParseFromString(bytes));
     const std::string within = request.SerializeAsString();
