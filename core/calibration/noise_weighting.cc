@@ -41,11 +41,12 @@ bool NoiseWeighting::Reweight() {
 bool NoiseWeighting::WeightByTracks() {
   if (!options_.correlated_tracks) return true;
   const Eigen::MatrixXd basis = TangentBasis(point_->rig(), point_->subspace());
-  track_noise_ = TrackNoiseFactor(point_->Round(basis),
-                                  point_->linearised(),
-                                  point_->estimate(),
-                                  point_->screening().landmarks);
-  if (track_noise_ < 1 + kLeastTrackNoise) return true;
+  const double excess = TrackNoiseFactor(point_->Round(basis),
+                                         point_->linearised(),
+                                         point_->estimate(),
+                                         point_->screening().landmarks);
+  track_noise_ = excess * point_->track_noise_factor();
+  if (excess < 1 + kLeastTrackNoise) return true;
   point_->WeightByTracks(track_noise_);
   return descent_->Repeat();
 }

@@ -29,7 +29,8 @@ namespace selfcal {
 // whatever the loss; if the pixel sigma is wrong, it is the resulting error of
 // the sigmas of theta. The landmarks must be at the minimum of their residuals,
 // theta and keyframes near that of the round, which was linearised there with
-// its loss. Returns 0 if the data is insufficient.
+// its loss. If their weights account for a factor already, the result is what
+// exceeds it. Returns 0 if the data is insufficient.
 double TrackNoiseFactor(const SolverRound& round,
                         const LinearisedRound& linearised,
                         const CalibrationEstimate& estimate,

@@ -102,6 +102,36 @@ TEST(TrackNoise, SigmasAreConsistentWhenTracksDrift) {
               without / kSeeds);
 }
 
+// Calm motion leaves directions that are released later, after which the noise
+// is estimated once more, at weights that account for the track noise already.
+// If that were forgotten, the errors of the tracks would pass for random walks
+// of the biases, up to five times too large.
+TEST(TrackNoise, ErrorsOfTracksDoNotPassForWalks) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Rig rig = HandheldRig("simulated");
+    const Calibration truth = rig.factory;
+    rig.factory = PerturbCalibration(truth, {}, seed);
+    SimulationOptions options;
+    options.seed = seed;
+    options.pixel_correlation = 0.9;
+    const auto session = Simulate(rig,
+                                  truth,
+                                  rig.factory,
+                                  *MakeHandheld(8.5, 0.15, seed),
+                                  "session",
+                                  options);
+    const CalibrationResult result =
+        Calibrate(rig, rig.factory, session.segments);
+    ASSERT_EQ(result.status, CalibrateStatus::kConverged);
+    EXPECT_GT(result.track_noise_factor, 1.5);
+    for (const NoiseKind kind :
+         {NoiseKind::kGyroBiasWalk, NoiseKind::kAccelBiasWalk}) {
+      EXPECT_LT(result.noise_scales.at(IndexOf(kind)).used, 2)
+          << NoiseKindName(kind) << ", seed " << seed;
+    }
+  }
+}
+
 // The ratio of a session with these errors, at its truth.
 double SuccessiveRatio(const SimulationOptions& options) {
   const ScreenedSession session(
