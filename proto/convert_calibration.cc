@@ -9,6 +9,7 @@
 #include "core/model/camera_model.h"
 #include "core/model/parameter_blocks.h"
 #include "core/model/temperature.h"
+#include "core/model/too_many.h"
 #include "proto/convert.h"
 
 namespace selfcal {
@@ -321,10 +322,8 @@ Violations FromProto(const v1::CalibrationParameters& message,
     Require(message.imu1().has_p_ji(), prefix + "imu1.p_ji", &violations);
   }
   if (message.cameras_size() > kMaxCameras) {
-    violations.push_back({prefix + "cameras",
-                          "has " + std::to_string(message.cameras_size()) +
-                              " elements; at most " +
-                              std::to_string(kMaxCameras) + " are allowed"});
+    violations.push_back(
+        {prefix + "cameras", TooMany(message.cameras().size(), kMaxCameras)});
     return violations;
   }
   read.cameras.resize(message.cameras_size());

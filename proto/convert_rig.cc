@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "core/model/too_many.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"
 
@@ -33,10 +34,8 @@ void ReadBlocks(const v1::Rig& message,
                 Rig* rig,
                 std::vector<Violation>* violations) {
   if (static_cast<std::size_t>(message.blocks_size()) > kMaxPatterns) {
-    violations->push_back({prefix + "blocks",
-                           "has " + std::to_string(message.blocks_size()) +
-                               " elements; at most " +
-                               std::to_string(kMaxPatterns) + " are allowed"});
+    violations->push_back(
+        {prefix + "blocks", TooMany(message.blocks().size(), kMaxPatterns)});
     return;
   }
   for (const v1::BlockSetting& setting : message.blocks()) {

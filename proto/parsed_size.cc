@@ -31,7 +31,7 @@ constexpr std::int64_t kOfUnknown =
 // Depth to which protobuf parses.
 constexpr int kMaxDepth = 100;
 
-// What the fields of one type of message are, by number.
+// The fields of one type of message, by number.
 struct TypeLayout {
   struct Field {
     bool is_known = false;

@@ -1,4 +1,4 @@
-// How much memory a message takes once it is parsed, before it is.
+// Memory that a message will take, from its wire format, before it is parsed.
 //
 // An empty message within another one, or a field that this program does not
 // know, is two bytes on the wire and a hundred in memory: a message of 64 MiB

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/model/too_many.h"
+
 namespace selfcal {
 
 Eigen::VectorXd WalkDensities(const Rig& rig,
@@ -24,9 +26,7 @@ std::vector<Violation> Validate(const Rig& rig,
   // Keeps squares finite, whatever the age.
   constexpr double kMostDensity = 1e6;
   if (walks.size() > kMaxPatterns) {
-    return {{"walk_densities",
-             "has " + std::to_string(walks.size()) + " elements; at most " +
-                 std::to_string(kMaxPatterns) + " are allowed"}};
+    return {{"walk_densities", TooMany(walks.size(), kMaxPatterns)}};
   }
   const auto components = TangentComponents(rig.factory);
   std::vector<Violation> violations;

@@ -26,7 +26,7 @@ class ChainStructure {
 
   int keyframes() const { return static_cast<int>(poses_begin_.size()) - 1; }
   int max_slots() const { return max_slots_; }
-  // What the elimination takes for the poses that are in the front at once, and
+  // Memory of the elimination for the poses that are in the front at once, and
   // for the landmarks that are eliminated with one keyframe: it grows with the
   // square of the length of the tracks.
   std::size_t Bytes() const;

@@ -11,8 +11,8 @@
 namespace selfcal {
 namespace {
 
-// Limit for the tracks of a segment (ChainShape): enough for tracks through 600
-// keyframes, and little beside what a daemon may use.
+// Limit for the tracks of a segment (ChainShape): enough for tracks through
+// about 650 keyframes, and little beside what a daemon may use.
 constexpr std::size_t kMaxTrackBytes = std::size_t{128} << 20;
 
 // The gauge is also a prior: the rest of the problem does not depend on it, so

@@ -8,6 +8,7 @@
 #include "core/model/camera_model.h"
 #include "core/model/parameter_blocks.h"
 #include "core/model/rig.h"
+#include "core/model/too_many.h"
 #include "core/model/violation_list.h"
 
 namespace selfcal {
@@ -153,9 +154,7 @@ std::vector<Violation> Validate(const Calibration& theta,
   if (count == 0) {
     list.Add(cameras, "is empty; at least one camera is needed");
   } else if (count > static_cast<std::size_t>(kMaxCameras)) {
-    list.Add(cameras,
-             "has " + std::to_string(count) + " elements; at most " +
-                 std::to_string(kMaxCameras) + " are allowed");
+    list.Add(cameras, TooMany(count, kMaxCameras));
     return list.Take();
   }
   for (std::size_t j = 0; j < count; ++j) {

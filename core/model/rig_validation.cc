@@ -7,6 +7,7 @@
 
 #include "core/model/parameter_blocks.h"
 #include "core/model/rig.h"
+#include "core/model/too_many.h"
 #include "core/model/violation_list.h"
 
 namespace selfcal {
@@ -92,9 +93,7 @@ bool CheckCount(const std::string& field,
                 std::size_t max_count,
                 ViolationList* list) {
   if (count <= max_count) return true;
-  list->Add(field,
-            "has " + std::to_string(count) + " elements; at most " +
-                std::to_string(max_count) + " are allowed");
+  list->Add(field, TooMany(count, max_count));
   return false;
 }
 

@@ -12,6 +12,7 @@
 #include "core/model/image_bounds.h"
 #include "core/model/segment.h"
 #include "core/model/temperature.h"
+#include "core/model/too_many.h"
 #include "core/model/violation_list.h"
 
 namespace selfcal {
@@ -134,8 +135,7 @@ bool CheckCount(std::string_view field,
                 ViolationList* list) {
   if (count > static_cast<std::size_t>(std::max(max_count, 0))) {
     list->Add(std::string(field),
-              "has " + std::to_string(count) + " elements; at most " +
-                  std::to_string(max_count) + " are allowed");
+              TooMany(count, static_cast<std::size_t>(std::max(max_count, 0))));
     return false;
   }
   if (count < static_cast<std::size_t>(std::max(min_count, 0))) {

@@ -20,7 +20,7 @@
 
 namespace selfcal::server {
 
-// What a score depends on besides its segment.
+// The version and the prior with which a segment is scored.
 struct ScoreBasis {
   std::int64_t active = 0;       // version
   Eigen::VectorXd prior_sigmas;  // of the rig

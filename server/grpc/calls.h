@@ -30,7 +30,7 @@ struct CallContext {
   CallThreads* threads = nullptr;
   ReadGate* reads = nullptr;
   MemoryPool* work = nullptr;  // for what requests become
-  std::int64_t max_request_bytes = 64 << 20;
+  std::int64_t max_request_bytes = 0;
   WatchSender* watches = nullptr;
   std::chrono::milliseconds max_write_time{60'000};  // of one response
   int max_exchanges = 256;                           // at once

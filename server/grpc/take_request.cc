@@ -16,7 +16,7 @@
 namespace selfcal::server {
 namespace {
 
-// What a request needs in bytes, for each of its own, while it is parsed,
+// Bytes that a request needs, for each of its own, while it is parsed,
 // converted, and packed to be stored.
 constexpr std::int64_t kWorkPerByte = 4;
 

@@ -243,8 +243,8 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::Choose(
   return claims[*next];
 }
 
-// The score of an older segment would be refused, and it be scored once more,
-// after this one.
+// The score of the older segment would be refused, and computed once more after
+// that of this one.
 bool ScoringWorkers::IsScoredUnderAnother(const RigClaim& claim) const {
   for (auto scored = claimed_.lower_bound(
            {claim.rig, std::numeric_limits<std::int64_t>::min()});

@@ -19,8 +19,7 @@ namespace selfcal::server {
 //   check could not be made, or if `effects` or `remembered` passed with a
 //   sentence: an effect that the rig does not estimate shifts a component by
 //   over its sigma, or the segments whose data is gone contradict it together.
-//   Each has a sentence.
-//   Held-out segments may be missing if two halves agree.
+//   Each has a sentence. Held-out segments may be missing if two halves agree.
 // - Good otherwise; the notes of the checks are its sentences.
 Verdict MakeVerdict(const Rig& rig,
                     const CalibrationResult& result,

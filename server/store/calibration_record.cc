@@ -39,7 +39,7 @@ std::string SerializeCalibration(const StoredCalibration& calibration) {
 namespace {
 
 bool ParseBytes(std::string_view bytes, store::CalibrationRecord* record) {
-  if (!record->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+  if (!ParseStored(bytes, record)) {
     return false;
   }
   if (record->has_earlier_report()) {

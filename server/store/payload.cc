@@ -1,7 +1,6 @@
 #include "server/store/payload.h"
 
 #include <fmt/format.h>
-#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <zstd.h>
 
 #include <array>
@@ -10,9 +9,9 @@
 #include <utility>
 
 #include "proto/convert.h"
-#include "proto/parsed_size.h"
 #include "server/status/status_macros.h"
 #include "server/store/checksum.h"
+#include "server/store/record_parts.h"
 
 namespace selfcal::server {
 namespace {
@@ -23,11 +22,6 @@ constexpr int kCompressionLevel = -1;
 // More than a segment within SegmentLimits can need, and less than a message
 // can hold.
 constexpr std::int64_t kMaxRawBytes = std::int64_t{1} << 30;
-
-// Most that the message of a segment takes in memory, for each of its bytes
-// (ParsedSize), and besides.
-constexpr std::int64_t kMostParsed = 4;
-constexpr std::int64_t kLeastParsed = 1 << 16;
 
 absl::Status Damaged(const std::string& what) {
   return absl::DataLossError(fmt::format(
@@ -114,16 +108,9 @@ absl::StatusOr<MotionSegment> UnpackSegment(const Payload& payload,
   const std::size_t size = ZSTD_decompress(
       raw.data(), raw.size(), payload.data.data(), payload.data.size());
   if (ZSTD_isError(size) || size != raw.size()) return Damaged(what);
-  google::protobuf::io::ArrayInputStream stream(raw.data(),
-                                                static_cast<int>(raw.size()));
-  // Many more elements than content are no segment.
-  if (ParsedSize(*v1::MotionSegment::descriptor(), &stream) >
-      kMostParsed * payload.raw_bytes + kLeastParsed) {
-    return Damaged(what);
-  }
   v1::MotionSegment message;
   MotionSegment segment;
-  if (!message.ParseFromString(raw) ||
+  if (!ParseStored(raw, &message) ||
       !FromProto(message, "", &segment).empty()) {
     return Damaged(what);
   }

@@ -1,6 +1,7 @@
 #include "server/store/record_parts.h"
 
 #include <fmt/format.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -10,6 +11,7 @@
 
 #include "core/model/parameter_blocks.h"
 #include "proto/convert.h"
+#include "proto/parsed_size.h"
 #include "server/convert/convert.h"
 
 namespace selfcal::server {
@@ -75,6 +77,16 @@ bool FindPlaces(const Calibration& theta,
 }
 
 }  // namespace
+
+bool ParseStored(std::string_view bytes, google::protobuf::Message* message) {
+  constexpr std::int64_t kMostPerByte = 16;
+  constexpr std::int64_t kAlwaysAllowed = 1 << 20;
+  const auto size = static_cast<int>(bytes.size());
+  google::protobuf::io::ArrayInputStream stream(bytes.data(), size);
+  return ParsedSize(*message->GetDescriptor(), &stream) <=
+             kMostPerByte * size + kAlwaysAllowed &&
+         message->ParseFromArray(bytes.data(), size);
+}
 
 void PutComponents(const Calibration& theta,
                    Eigen::Index size,

@@ -2,16 +2,22 @@
 #pragma once
 
 #include <absl/status/status.h>
+#include <google/protobuf/message.h>
 #include <google/protobuf/repeated_ptr_field.h>
 
 #include <Eigen/Core>
 #include <string>
+#include <string_view>
 
 #include "core/calibration/calibrate.h"
 #include "core/model/calibration.h"
 #include "selfcal/store/records.pb.h"
 
 namespace selfcal::server {
+
+// Parses a message that was stored. False for bytes that are none, or that
+// would take far more memory than any record does (ParsedSize).
+bool ParseStored(std::string_view bytes, google::protobuf::Message* message);
 
 void PutMatrix(const Eigen::MatrixXd& matrix, store::MatrixRecord* record);
 // False if the number of values does not match the dimensions.

@@ -10,13 +10,10 @@
 namespace selfcal::server {
 namespace {
 
-template <typename Message>
 absl::Status ParseMessage(std::string_view bytes,
                           const std::string& what,
-                          Message* message) {
-  return message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))
-             ? absl::OkStatus()
-             : DamagedRecord(what);
+                          google::protobuf::Message* message) {
+  return ParseStored(bytes, message) ? absl::OkStatus() : DamagedRecord(what);
 }
 
 void PutLandmarks(const LandmarkSketch& landmarks,

@@ -1,6 +1,7 @@
 #include "server/store/report.h"
 
 #include <fmt/format.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -11,6 +12,7 @@
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "proto/label_text.h"
+#include "proto/parsed_size.h"
 #include "selfcal/store/report.pb.h"
 #include "server/status/status_macros.h"
 #include "server/store/announcements.h"
@@ -33,7 +35,8 @@ namespace {
 using Record = store::ReportedRecords::Record;
 using Rows = std::vector<ReportedRow>;
 
-// A message of data beyond this is not taken: it could not be read here.
+// A message of data beyond this is not taken, as it could not be read here, nor
+// are records that would take more once they are parsed.
 constexpr std::int64_t kMaxReportedBytes = std::int64_t{256} << 20;
 
 // The value of the column state.
@@ -55,7 +58,7 @@ absl::Status Contradiction(const std::string& what) {
       fmt::format("the report contradicts the records of the hub: {}", what));
 }
 
-// What is needed to write the records of one report.
+// The writing of the records of one report.
 struct Application {
   UnitOfWork* tx;
   const AdmitData& admit_data;
@@ -78,6 +81,12 @@ absl::Status About(const std::string& what, const absl::Status& checked) {
 
 absl::StatusOr<store::ReportedRecords> Parse(const std::string& bytes) {
   store::ReportedRecords records;
+  google::protobuf::io::ArrayInputStream stream(bytes.data(),
+                                                static_cast<int>(bytes.size()));
+  if (ParsedSize(*store::ReportedRecords::descriptor(), &stream) >
+      kMaxReportedBytes) {
+    return BadReport("its records would take too much memory");
+  }
   if (!records.ParseFromString(bytes)) {
     return BadReport("its records are no message of this kind");
   }
@@ -145,7 +154,7 @@ absl::Status ApplyRig(Application* to, const Rows& rows) {
   if (stored.rig.id != tx->rig()) {
     return BadReport(fmt::format("it defines the rig {}", stored.rig.id));
   }
-  // What is stored was computed with it.
+  // All that is stored was computed with it.
   if (!SameShape(stored.rig.factory, *to->factory)) {
     return Contradiction("the rig has other sensors or parameters");
   }

@@ -1,6 +1,6 @@
-// What a hub assumes of the records that a device reports, beyond that they can
-// be read. The messages of a device are not those of this program: a matrix of
-// another size than its calibration would be read beyond its end.
+// Assumptions of a hub on the records that a device reports, beyond that they
+// can be read. The messages of a device are not those of this program: a matrix
+// of another size than its calibration would be read beyond its end.
 //
 // Each returns INVALID_ARGUMENT that says what is wrong, unless stated
 // otherwise.

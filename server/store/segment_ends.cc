@@ -71,7 +71,7 @@ absl::StatusOr<SegmentEnds> ParseEnds(std::string_view bytes) {
   SegmentEnds ends;
   MotionSegment states;
   const ComponentNames& names = record.components();
-  if (!record.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
+  if (!ParseStored(bytes, &record) ||
       !FromProto(record.theta0(), "", &ends.theta0).empty() ||
       !FromProto(record.states(), "", &states).empty() ||
       states.keyframes.size() != 2 ||

@@ -38,7 +38,7 @@ std::string SerializePath(const std::vector<PathPoint>& path) {
 absl::StatusOr<std::vector<PathPoint>> ParsePath(std::string_view bytes,
                                                  const std::string& what) {
   store::SegmentPathRecord record;
-  if (!record.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
+  if (!ParseStored(bytes, &record) ||
       record.positions_m_size() != 3 * record.seconds_size()) {
     return DamagedRecord(what);
   }

@@ -136,8 +136,7 @@ absl::Status ParseValidation(std::string_view bytes,
                              const std::string& what,
                              StoredCalibration* calibration) {
   store::ValidationRecord record;
-  if (!record.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
-      record.rig() != calibration->rig ||
+  if (!ParseStored(bytes, &record) || record.rig() != calibration->rig ||
       record.version() != calibration->version) {
     return DamagedRecord("the validation of " + what);
   }

@@ -54,6 +54,12 @@ TEST(ParsedSize, IsAtLeastWhatTheMessageTakes) {
     EXPECT_GE(SizeOf<v1::Rig>(rig), Actual<v1::Rig>(rig));
   }
   for (const int count : {0, 1, 1000}) {
+    v1::Rig labelled;
+    for (int i = 0; i < count; ++i) {
+      (*labelled.mutable_labels())["label" + std::to_string(i)] = "value";
+    }
+    const std::string labels = labelled.SerializeAsString();
+    EXPECT_GE(SizeOf<v1::Rig>(labels), Actual<v1::Rig>(labels));
     const std::string cameras = EmptyCameras(count);
     EXPECT_GE(SizeOf<v1::CreateRigRequest>(cameras),
               Actual<v1::CreateRigRequest>(cameras));

@@ -76,6 +76,8 @@ inline v1::Calibration Version(std::int64_t version) {
   noise->set_determined(true);
   noise = calibration.mutable_solver()->add_noise_factors();
   noise->set_kind("gyro_bias_walk");
+  noise = calibration.mutable_solver()->add_noise_factors();
+  noise->set_kind("imu1_accel");
   return calibration;
 }
 

@@ -288,6 +288,7 @@ TEST_F(Commands, ShowsACalibrationWithItsOriginAndValues) {
   EXPECT_THAT(
       outcome.out,
       HasSubstr("noise\tgyro bias walk: residuals do not determine it\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("noise\tsecond accel noise: residuals"));
   EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255.123\tpx\t0.034\n"));
   Selfcal({"calibrations", "show", "device", "7"});
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/7");

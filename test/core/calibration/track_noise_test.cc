@@ -23,8 +23,10 @@ struct Outcome {
   double nees = 0;
 };
 
-// A simulated device whose rig states `believed` times the actual pixel noise.
-Outcome CalibrateDevice(std::uint64_t seed,
+// A simulated device that moves so, and whose rig states `believed` times the
+// actual pixel noise.
+Outcome CalibrateDevice(const Trajectory& motion,
+                        std::uint64_t seed,
                         double pixel_correlation,
                         double believed,
                         const CalibrateOptions& options) {
@@ -34,8 +36,8 @@ Outcome CalibrateDevice(std::uint64_t seed,
   SimulationOptions simulation;
   simulation.seed = seed;
   simulation.pixel_correlation = pixel_correlation;
-  const auto session = Simulate(
-      rig, truth, rig.factory, *MakeMixed(17, seed), "session", simulation);
+  const auto session =
+      Simulate(rig, truth, rig.factory, motion, "session", simulation);
   rig.pixel_sigma_px *= believed;
   Outcome outcome{Calibrate(rig, rig.factory, session.segments, options), 0};
   const std::vector<int> free = FreeComponents(rig);
@@ -43,6 +45,14 @@ Outcome CalibrateDevice(std::uint64_t seed,
   const Eigen::MatrixXd covariance = outcome.result.covariance(free, free);
   outcome.nees = error.dot(covariance.ldlt().solve(error));
   return outcome;
+}
+
+Outcome CalibrateDevice(std::uint64_t seed,
+                        double pixel_correlation,
+                        double believed,
+                        const CalibrateOptions& options) {
+  return CalibrateDevice(
+      *MakeMixed(17, seed), seed, pixel_correlation, believed, options);
 }
 
 TEST(TrackNoise, IndependentErrorsAreNotScaled) {
@@ -108,20 +118,9 @@ TEST(TrackNoise, SigmasAreConsistentWhenTracksDrift) {
 // of the biases, up to five times too large.
 TEST(TrackNoise, ErrorsOfTracksDoNotPassForWalks) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    Rig rig = HandheldRig("simulated");
-    const Calibration truth = rig.factory;
-    rig.factory = PerturbCalibration(truth, {}, seed);
-    SimulationOptions options;
-    options.seed = seed;
-    options.pixel_correlation = 0.9;
-    const auto session = Simulate(rig,
-                                  truth,
-                                  rig.factory,
-                                  *MakeHandheld(8.5, 0.15, seed),
-                                  "session",
-                                  options);
     const CalibrationResult result =
-        Calibrate(rig, rig.factory, session.segments);
+        CalibrateDevice(*MakeHandheld(8.5, 0.15, seed), seed, 0.9, 1, {})
+            .result;
     ASSERT_EQ(result.status, CalibrateStatus::kConverged);
     EXPECT_GT(result.track_noise_factor, 1.5);
     for (const NoiseKind kind :
