@@ -4,11 +4,10 @@
 #include <utility>
 
 #include "core/calibration/calibration_run.h"
+#include "core/calibration/clock_start.h"
 #include "core/calibration/partition.h"
 #include "core/calibration/segment_agreement.h"
-#include "core/information/offset_start.h"
 #include "core/information/segment_scorer.h"
-#include "core/model/median.h"
 
 namespace selfcal {
 namespace {
@@ -162,63 +161,6 @@ CalibrationResult CalibrateOnWhatAgrees(
   CompleteWithRemembered(rig, selection.used(), options, &run);
   selection.Complete(&run.result.segment_fits);
   return std::move(run.result);
-}
-
-// A time offset that a segment shows beyond that of theta, and when.
-struct OffsetShift {
-  double session_s;
-  double shift_s;
-};
-
-// Shifts nearer to each other say nothing about a drift: they err by up to 2 ms
-// (time_offset.h), and two quartz clocks drift by less than 2 ms in this time.
-constexpr double kLeastApart_s = 30;
-
-// Moves the time offsets of theta by the median of the shifts, and its time
-// drifts, if every camera has one, by the median slope between any two.
-void MoveClocks(const std::vector<OffsetShift>& shifts, Calibration* theta) {
-  const bool drifts = std::all_of(
-      theta->cameras.begin(),
-      theta->cameras.end(),
-      [](const CameraCalibration& camera) { return camera.time_drift; });
-  std::vector<double> slopes;
-  for (const OffsetShift& a : shifts) {
-    for (const OffsetShift& b : shifts) {
-      const double apart_s = b.session_s - a.session_s;
-      if (!drifts || apart_s < kLeastApart_s) continue;
-      slopes.push_back((b.shift_s - a.shift_s) / apart_s);
-    }
-  }
-  const double drift = slopes.empty() ? 0 : UpperMedian(std::move(slopes));
-  std::vector<double> offsets_s;
-  for (const OffsetShift& at : shifts) {
-    offsets_s.push_back(at.shift_s - drift * at.session_s);
-  }
-  const double offset_s = UpperMedian(std::move(offsets_s));
-  for (CameraCalibration& camera : theta->cameras) {
-    camera.time_offset_s += offset_s;
-    if (drifts) *camera.time_drift += drift;
-  }
-}
-
-// Moves segments whose states do not hold at their stamps, and the clocks of
-// theta by what these segments show. `moved` has room for all and holds those
-// that replace elements of `segments`.
-void StartAtOffsets(const Rig& rig,
-                    Calibration* theta,
-                    std::vector<const MotionSegment*>* segments,
-                    std::vector<MotionSegment>* moved) {
-  std::vector<OffsetShift> shifts;
-  moved->reserve(segments->size());
-  for (const MotionSegment*& segment : *segments) {
-    std::optional<OffsetStart> start = FindOffsetStart(rig, *theta, *segment);
-    if (!start) continue;
-    moved->push_back(std::move(start->segment));
-    segment = &moved->back();
-    shifts.push_back(
-        {SessionTime(*segment, segment->keyframes.front()), start->shift_s});
-  }
-  if (!shifts.empty()) MoveClocks(shifts, theta);
 }
 
 }  // namespace

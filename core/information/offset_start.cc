@@ -45,13 +45,23 @@ double MedianResidual(const Rig& rig,
 
 }  // namespace
 
+bool IsEstimatedOfAllCameras(const Rig& rig, const std::string& component) {
+  const std::vector<TangentComponent> components =
+      TangentComponents(rig.factory);
+  const std::vector<int> free = FreeComponents(rig);
+  for (std::size_t j = 0; j < rig.factory.cameras.size(); ++j) {
+    const std::string name = "cam" + std::to_string(j) + "." + component;
+    const bool estimated = std::ranges::any_of(
+        free, [&](int i) { return components[i].name == name; });
+    if (!estimated) return false;
+  }
+  return true;
+}
+
 std::optional<OffsetStart> FindOffsetStart(const Rig& rig,
                                            const Calibration& theta,
                                            const MotionSegment& segment) {
-  const std::vector<char> estimated = EstimatedTimeOffsets(rig);
-  if (std::count(estimated.begin(), estimated.end(), 0) > 0) {
-    return std::nullopt;
-  }
+  if (!IsEstimatedOfAllCameras(rig, "time_offset")) return std::nullopt;
   const SegmentTheta theta_s(theta, segment);
   const auto found = EstimateTimeOffset(*theta_s, std::span(&segment, 1));
   if (!found || std::abs(found->offset_s) <=

@@ -15,6 +15,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
@@ -24,6 +25,10 @@ namespace selfcal {
 
 // Smaller errors are in the linear range.
 inline constexpr double kFarTimeOffset_s = 0.012;
+
+// Returns whether the rig estimates this component of every camera
+// ("time_offset"): only then may it start elsewhere.
+bool IsEstimatedOfAllCameras(const Rig& rig, const std::string& component);
 
 struct OffsetStart {
   Calibration theta;      // with other time offsets, if they become larger

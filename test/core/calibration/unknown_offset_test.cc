@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
+#include <string>
+#include <vector>
 
 #include "core/calibration/calibrate.h"
 
@@ -31,6 +35,49 @@ TEST(Calibrate, FindsATimeOffsetThatNobodyKnows) {
       EXPECT_EQ(fit.excluded, "");
     }
     EXPECT_LT(result.reprojection_rms_after_px, 1.6);
+  }
+}
+
+// What is not estimated stays as it is stated, whatever the segments show.
+TEST(Calibrate, ADriftThatIsHeldIsNotMoved) {
+  constexpr double kDrift = 1e-6;
+  DeviceOfUnknownOffset device = WithOffset(0.05, 5);
+  Rig& rig = device.rig;
+  rig.blocks = {{"*.time_offset", true}, {"*.time_drift", false}};
+  std::vector<MotionSegment> segments = device.session.segments;
+  rig.factory.cameras[0].time_drift = kDrift;
+  // Of sessions of one minute each: the shifts differ by their errors.
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    segments[s].key.session = "s" + std::to_string(s);
+    segments[s].session_start_ns =
+        segments[s].keyframes.front().t_ns -
+        static_cast<std::int64_t>(s) * 60'000'000'000;
+  }
+  const CalibrationResult result = Calibrate(rig, rig.factory, segments, {});
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  EXPECT_EQ(result.theta.cameras[0].time_drift, kDrift);
+}
+
+// One segment of another clock does not move that of all others.
+TEST(Calibrate, AFewSegmentsOfAnotherClockAreExcluded) {
+  const DeviceOfUnknownOffset device = WithOffset(0, 5);
+  std::vector<MotionSegment> segments = device.session.segments;
+  for (MotionSegment segment : WithOffset(0, 6).session.segments) {
+    segment.key.session = "t";
+    segments.push_back(segment);
+  }
+  ASSERT_EQ(segments.size(), 6u);
+  segments[1] = WithOffset(0.1, 5).session.segments[1];
+  const CalibrationResult result =
+      Calibrate(device.rig, device.rig.factory, segments, {});
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  const int at = TimeOffsetComponent(device.rig.factory, 0);
+  const double sigma_s = std::sqrt(result.covariance(at, at));
+  EXPECT_LT(std::abs(result.theta.cameras[0].time_offset_s), 4 * sigma_s);
+  EXPECT_LT(sigma_s, 1e-3);
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    EXPECT_EQ(result.segment_fits[s].excluded.empty(), s != 1)
+        << s << " " << result.segment_fits[s].excluded;
   }
 }
 

@@ -55,6 +55,13 @@ TEST(OffsetStart, IsOfNoUseNearTheOffsetOrIfItIsNotEstimated) {
   for (const MotionSegment& segment : known.session.segments) {
     EXPECT_FALSE(FindOffsetStart(known.rig, known.rig.factory, segment));
   }
+  // Nor if it is held while its slope with temperature is estimated.
+  known.rig.blocks = {{"*.time_offset", false}, {"*.time_offset_slope", true}};
+  AddEstimatedBlocks(known.rig.blocks, &known.rig.factory);
+  for (MotionSegment segment : known.session.segments) {
+    segment.temperature_c = 30;
+    EXPECT_FALSE(FindOffsetStart(known.rig, known.rig.factory, segment));
+  }
 }
 
 // A segment that does not fit where it would be scored is scored at the start.
