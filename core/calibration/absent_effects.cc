@@ -67,6 +67,7 @@ class EffectTests {
  public:
   EffectTests(const Rig& rig,
               const KnownCalibration& calibration,
+              const Eigen::MatrixXd& covariance_of_data,
               const Extended& all,
               const std::vector<MotionSegment>& segments)
       : names_(TangentComponents(all.rig.factory)),
@@ -82,8 +83,10 @@ class EffectTests {
     const std::vector<int> free = FreeComponents(rig);
     const Eigen::VectorXd scale =
         Eigen::VectorXd(PriorSigmas(rig)(free)).cwiseInverse();
-    Sigma_ = scale.asDiagonal() * calibration.covariance(free, free) *
-             scale.asDiagonal();
+    of_data_ = scale.asDiagonal() * covariance_of_data(free, free) *
+               scale.asDiagonal();
+    sigmas_ = scale.cwiseProduct(
+        Eigen::VectorXd(calibration.covariance.diagonal())(free).cwiseSqrt());
   }
 
   // Nothing if no component of the block is an effect that is not estimated.
@@ -135,7 +138,7 @@ class EffectTests {
     const Eigen::VectorXd eta =
         sum_.eta(at) - coupling.transpose() * eliminate.solve(sum_.eta(theta_));
     const SymmetricEigen eigen(S);
-    const Eigen::MatrixXd step = Sigma_ * coupling;  // of theta, by B
+    const Eigen::MatrixXd step = of_data_ * coupling;  // of theta, by B
     Eigen::VectorXd shift = Eigen::VectorXd::Zero(theta_.size());
     Eigen::VectorXd variance = Eigen::VectorXd::Zero(theta_.size());
     bool certain = false;
@@ -158,7 +161,7 @@ class EffectTests {
     if (!certain) return effect;
     for (Eigen::Index k = 0; k < shift.size(); ++k) {
       const double sigmas =
-          std::sqrt((shift(k) * shift(k) + variance(k)) / Sigma_(k, k));
+          std::sqrt(shift(k) * shift(k) + variance(k)) / sigmas_(k);
       if (sigmas <= effect.bias_sigmas) continue;
       effect.bias_sigmas = sigmas;
       effect.component = names_[free_[theta_[k]]].name;
@@ -170,7 +173,10 @@ class EffectTests {
   const std::vector<int> free_;  // with all effects
   const OffsetInformation sum_;  // of the free components
   std::vector<int> theta_;       // what the rig estimates, in the free ones
-  Eigen::MatrixXd Sigma_;        // of these, in units of the prior's sigmas
+  // Of these, in units of the prior's sigmas: the covariance of the data, and
+  // the sigmas of the calibration.
+  Eigen::MatrixXd of_data_;
+  Eigen::VectorXd sigmas_;
 };
 
 }  // namespace
@@ -178,11 +184,15 @@ class EffectTests {
 std::vector<AbsentEffect> TestAbsentEffects(
     const Rig& rig,
     const KnownCalibration& calibration,
+    const Eigen::MatrixXd& covariance_of_data,
     const std::vector<MotionSegment>& segments) {
   std::vector<AbsentEffect> effects;
   if (segments.empty()) return effects;
-  const EffectTests tests(
-      rig, calibration, WithEffects(rig, calibration.theta), segments);
+  const EffectTests tests(rig,
+                          calibration,
+                          covariance_of_data,
+                          WithEffects(rig, calibration.theta),
+                          segments);
   for (const char* effect : kEffects) {
     const std::vector<AbsentEffect> some = tests.Test(effect);
     effects.insert(effects.end(), some.begin(), some.end());

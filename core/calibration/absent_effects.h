@@ -9,8 +9,10 @@
 // rest of theta eliminated, the data gives S (B - B0) = eta with eta ~ N(0, S)
 // if the value is right (a score test). If a direction of B is certain, the
 // bias of theta is the step that the estimate of B would cause, by the
-// covariance of the calibration: what this knows otherwise, from joined
-// segments, is shifted less. The bias is a root mean square, with the
+// covariance of the calibration on these segments: what it knows otherwise,
+// from joined segments, is shifted less. Remembered segments
+// (remembered_segment.h) make theta more certain, but they show the same
+// effect, and shift it as much. The bias is a root mean square, with the
 // uncertainty of that estimate, and with the directions of B that are not
 // certain: theta follows an effect furthest where the motion shows it least.
 //
@@ -36,13 +38,16 @@ struct AbsentEffect {
   std::string component;  // that one
 };
 
-// `rig` states the noise that the calibration was weighted with. Segments that
+// `rig` states the noise that the calibration was weighted with;
+// `covariance_of_data` (D x D, tangent at calibration.theta) is that without
+// remembered segments. Segments that
 // the calibration does not accept (ConsistencyTester) are ignored. In the order
 // of theta; without effects that the rig estimates. None if `segments` is
 // empty.
 std::vector<AbsentEffect> TestAbsentEffects(
     const Rig& rig,
     const KnownCalibration& calibration,
+    const Eigen::MatrixXd& covariance_of_data,
     const std::vector<MotionSegment>& segments);
 
 }  // namespace selfcal

@@ -125,6 +125,7 @@ void CompleteWithRemembered(const Rig& rig,
   CalibrationResult& result = run->result;
   result.remembered = std::move(completed.use);
   if (completed.covariance.size() == 0) return;
+  result.covariance_of_data = std::move(result.covariance);
   result.theta = std::move(completed.theta);
   result.covariance = std::move(completed.covariance);
   result.Lambda += completed.Lambda;

@@ -98,6 +98,9 @@ struct CalibrationResult {
   // zero; a direction that was held constant keeps the prior's variance, so
   // that no sigma is small for a parameter that was not observed.
   Eigen::MatrixXd covariance;
+  // The same of the data alone, without remembered segments and the doubt about
+  // a device change; empty if they change nothing.
+  Eigen::MatrixXd covariance_of_data;
   // Information about theta (D x D, tangent at theta) of the data and of the
   // remembered segments, also along directions that were held constant.
   Eigen::MatrixXd Lambda;

@@ -103,6 +103,16 @@ class Fusion {
     });
   }
 
+  // Of those without data, the one that was received last.
+  SegmentKey Newest() const {
+    const JoinedSegment* newest = nullptr;
+    for (const JoinedSegment& one : joined_) {
+      if (one.calibrated_on) continue;
+      if (newest == nullptr || one.time_ns >= newest->time_ns) newest = &one;
+    }
+    return newest->ends->key;
+  }
+
   SplitFindings Compare(const std::vector<JoinedSegment>& segments) const {
     return FindSplit(
         rig_, theta_, at_.subspace.estimated, at_.excess, segments, options_);
@@ -180,6 +190,7 @@ class Fusion {
       return;
     }
     use.segments = found.segments;
+    use.newest = Newest();
     use.reach = found.reach;
     // Their weight is reduced if they differ by more than chance explains.
     const double weight = use.agreement.probability < kLikely

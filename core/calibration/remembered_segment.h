@@ -72,6 +72,8 @@ struct RememberedUse {
   // without a change.
   double change_probability = 0;
   Eigen::VectorXd change_sigmas = {};
+  // Of the segments that contribute, the one that was received last.
+  SegmentKey newest = {};
 };
 
 }  // namespace selfcal

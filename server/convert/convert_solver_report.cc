@@ -143,6 +143,7 @@ void Put(const std::string& rig,
          const RememberedUse& use,
          v1::EvictedUse* message) {
   message->set_segments(use.segments);
+  if (use.segments > 0) message->set_newest(SegmentName(rig, use.newest));
   message->set_too_far(use.too_far);
   message->set_contradicting(use.contradicting);
   message->set_compared(use.compared);
@@ -157,6 +158,7 @@ void Put(const std::string& rig,
 RememberedUse Get(const v1::EvictedUse& message) {
   RememberedUse use;
   use.segments = message.segments();
+  use.newest = KeyOf(message.newest());
   use.too_far = message.too_far();
   use.contradicting = message.contradicting();
   use.compared = message.compared();

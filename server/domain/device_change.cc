@@ -84,6 +84,59 @@ absl::StatusOr<bool> IsTestable(UnitOfWork* tx,
   return run.change == change;
 }
 
+// 0: it is gone.
+absl::StatusOr<std::int64_t> SequenceOf(UnitOfWork* tx, const SegmentKey& key) {
+  const auto segment = FindSegment(tx, key);
+  if (absl::IsNotFound(segment.status())) return 0;
+  SELFCAL_RETURN_IF_ERROR(segment.status());
+  return segment->sequence;
+}
+
+// The newest segment without data that the calibration rests on; 0: none.
+absl::StatusOr<std::int64_t> NewestRemembered(
+    UnitOfWork* tx, const StoredCalibration& calibration) {
+  if (!calibration.report || calibration.report->remembered.segments == 0) {
+    return 0;
+  }
+  return SequenceOf(tx, calibration.report->remembered.newest);
+}
+
+absl::StatusOr<std::int64_t> NewestIncluded(
+    UnitOfWork* tx, const StoredCalibration& calibration) {
+  SELFCAL_ASSIGN_OR_RETURN(std::int64_t newest,
+                           NewestRemembered(tx, calibration));
+  for (const SegmentKey& key : calibration.segments) {
+    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t sequence, SequenceOf(tx, key));
+    newest = std::max(newest, sequence);
+  }
+  return newest;
+}
+
+// The newest version up to `version` that rests on none of the segments from
+// `first_sequence` on: what it knows is not known from them. The factory
+// calibration if there is none since the last device change; from before that,
+// its groups are out of date.
+absl::StatusOr<std::int64_t> VersionBefore(UnitOfWork* tx,
+                                           std::int64_t version,
+                                           std::int64_t change,
+                                           std::int64_t first_sequence) {
+  constexpr std::int64_t kFactory = 1;
+  while (version > kFactory) {
+    const auto calibration = ReadCalibration(tx, version);
+    if (absl::IsDataLoss(calibration.status())) return kFactory;
+    SELFCAL_RETURN_IF_ERROR(calibration.status());
+    if (!calibration->run) return kFactory;
+    SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
+                             ReadRun(tx, *calibration->run));
+    if (run.change != change) return kFactory;
+    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest,
+                             NewestIncluded(tx, *calibration));
+    if (newest < first_sequence) return version;
+    version = run.base_version;
+  }
+  return kFactory;
+}
+
 std::string Describe(const Change& found, const StoredChange& change) {
   return fmt::format(
       "change {} ({}): calibration {} does not fit the segments from sequence "
@@ -179,8 +232,11 @@ absl::StatusOr<NewestExamined> ExamineNewest(UnitOfWork* tx,
   if (!testable) {
     return examined;
   }
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t since_change,
                            FirstSequenceSince(tx, newest_change));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t remembered,
+                           NewestRemembered(tx, *active));
+  const std::int64_t first_sequence = std::max(since_change, remembered + 1);
   const ConsistencyTester tester(
       rig.rig,
       {active->theta,
@@ -244,7 +300,9 @@ absl::StatusOr<std::optional<StoredChange>> StoreSplit(
   change.time_ns = tx->time_ns();
   change.kind = split.kind;
   change.first_sequence = first->sequence;
-  change.base_version = run.base_version;
+  SELFCAL_ASSIGN_OR_RETURN(
+      change.base_version,
+      VersionBefore(tx, run.base_version, run.change, first->sequence));
   change.inflation = 1;
   change.groups = split.concerned;
   SELFCAL_RETURN_IF_ERROR(

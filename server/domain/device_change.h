@@ -33,9 +33,10 @@ struct NewestExamined {
 
 // Tests the newest scored segments of the rig against its active calibration,
 // if that is the result of a run since the last device change and has measured
-// the track noise. Segments that it was computed on, damaged ones, misfits and
-// those that cannot be tested against it are left out. A segment that shows
-// another theta than both of its neighbours (core/change/isolated.h) is
+// the track noise. Segments that it was computed on, and if it rests on
+// remembered ones all up to the newest of these, are left out, as are damaged
+// ones, misfits and those that cannot be tested against it. A segment that
+// shows another theta than both of its neighbours (core/change/isolated.h) is
 // quarantined; the first and the last one, which have one neighbour, are only
 // left out. A device change that is detected is stored.
 absl::StatusOr<NewestExamined> ExamineNewest(UnitOfWork* tx,
@@ -44,7 +45,9 @@ absl::StatusOr<NewestExamined> ExamineNewest(UnitOfWork* tx,
 
 // Stores the device change that the result of a run shows among its segments
 // (DeviceSplit), if chance explains it rarely enough, no change was stored
-// since the run was created, and its first segment still exists.
+// since the run was created, and its first segment still exists. What remains
+// known is what the newest version knows that rests on none of the segments
+// since (StoredChange::base_version).
 absl::StatusOr<std::optional<StoredChange>> StoreSplit(
     UnitOfWork* tx,
     const StoredRun& run,

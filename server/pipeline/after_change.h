@@ -1,8 +1,10 @@
-// What remains known of a calibration from before a device change. Pure
-// functions.
+// What remains known of a calibration from before a device change.
 #pragma once
 
+#include <absl/status/statusor.h>
+
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,11 +17,18 @@
 
 namespace selfcal::server {
 
+// True for the factory calibration, and for a version whose run was created
+// before the change was found, even if that run found it: its tables held
+// segments from before.
+absl::StatusOr<bool> IsFromBefore(Store* store,
+                                  const StoredCalibration& version,
+                                  std::int64_t change);
+
 // `since` is the information of the segments since the change, `before` the
-// calibration from before it (change.base_version). Groups that the change was
-// not found to concern may have changed as well, by as much as these segments
-// would not show; their earlier estimates are less certain by that much
-// (core/change/group_concern.h).
+// calibration from before it (StoredChange::base_version). Groups that the
+// change was not found to concern may have changed as well, by as much as these
+// segments would not show; their earlier estimates are less certain by that
+// much (core/change/group_concern.h).
 
 // The prior of the runs after the change: what `before` knows of the components
 // that the change does not concern.

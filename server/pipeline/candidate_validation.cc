@@ -12,12 +12,17 @@ namespace {
 // What is wrong with the numbers; if anything, nothing else can be checked.
 std::string NumbersProblem(const Rig& rig, const CalibrationResult& result) {
   const Eigen::Index size = TangentSize(rig.factory);
-  if (!SameShape(result.theta, rig.factory) ||
-      result.covariance.rows() != size || result.covariance.cols() != size) {
+  const auto has_size = [&](const Eigen::MatrixXd& matrix) {
+    return matrix.rows() == size && matrix.cols() == size;
+  };
+  if (!SameShape(result.theta, rig.factory) || !has_size(result.covariance) ||
+      (result.covariance_of_data.size() > 0 &&
+       !has_size(result.covariance_of_data))) {
     return "the result does not have the shape of the rig";
   }
   if (!ReadableValues(result.theta).allFinite() ||
-      !result.covariance.allFinite()) {
+      !result.covariance.allFinite() ||
+      !result.covariance_of_data.allFinite()) {
     return "the result has numbers that are not finite";
   }
   if (result.covariance.diagonal().minCoeff() < 0) {

@@ -65,8 +65,12 @@ absl::StatusOr<RigCoaching> RigCoach::Advise(const std::string& rig_name) {
   const std::vector<TableEntry> in_tables = UnionOfTables(tables);
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
                            InformationSince(store_, active, in_tables));
-  if (change && change->base_version == active.version) {
-    active.covariance = CovarianceAfter(rig.rig, *change, active, since);
+  if (change) {
+    SELFCAL_ASSIGN_OR_RETURN(const bool from_before,
+                             IsFromBefore(store_, active, change->change));
+    if (from_before && active.run) {
+      active.covariance = CovarianceAfter(rig.rig, *change, active, since);
+    }
   }
   const Eigen::MatrixXd known =
       KnownInformation(rig.rig, active.theta, active.covariance, since);

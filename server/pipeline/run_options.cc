@@ -27,10 +27,13 @@ absl::StatusOr<CalibrateOptions> OptionsOfRun(Domain* domain,
                            store->GetChange(run.rig, run.change));
   SELFCAL_ASSIGN_OR_RETURN(StoredCalibration before,
                            store->GetCalibration(run.rig, change.base_version));
-  before.covariance = CovarianceAt(rig, before, run.create_steady_ns);
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
-                           ListInformation(store, run.rig, run.segments));
-  options.prior = KnownAfter(rig.rig, change, before, since);
+  // The factory calibration is no estimate.
+  if (before.run) {
+    before.covariance = CovarianceAt(rig, before, run.create_steady_ns);
+    SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
+                             ListInformation(store, run.rig, run.segments));
+    options.prior = KnownAfter(rig.rig, change, before, since);
+  }
   std::optional<StoredChange> earlier;
   if (run.change > 1) {
     SELFCAL_ASSIGN_OR_RETURN(earlier,

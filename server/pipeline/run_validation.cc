@@ -49,18 +49,6 @@ bool IsExcluded(const CalibrationResult& result, const SegmentKey& key) {
                      });
 }
 
-// True for the factory calibration, and for a version whose run was created
-// before the change was found, even if that run found it: its tables held
-// segments from before.
-absl::StatusOr<bool> IsFromBefore(Store* store,
-                                  const StoredCalibration& active,
-                                  std::int64_t change) {
-  if (!active.run) return true;
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
-                           store->GetRun(active.rig, *active.run));
-  return run.change < change;
-}
-
 // nullopt if the data cannot be used; an error if it cannot be read now.
 absl::StatusOr<std::optional<SegmentInformation>> Rescore(
     const RunContext& context,
@@ -150,9 +138,11 @@ absl::Status ExamineUsed(const RunContext& context,
   // Elsewhere than at the minimum, theta itself explains what is left.
   if (result.status == CalibrateStatus::kConverged &&
       HasUsableNumbers(rig, result)) {
+    const bool completed = result.covariance_of_data.size() > 0;
     evidence->effects = TestAbsentEffects(
         WithUsedNoise(rig, result),
         {result.theta, result.covariance, result.track_noise_factor},
+        completed ? result.covariance_of_data : result.covariance,
         *segments);
   }
   return absl::OkStatus();
@@ -183,8 +173,16 @@ absl::StatusOr<std::string> Validate(const RunContext& context,
       SELFCAL_ASSIGN_OR_RETURN(
           const std::vector<SegmentInformation> since,
           ListInformation(context.store(), run.rig, run.segments));
+      // A later one rests on segments of both devices.
+      StoredCalibration before = evidence.active;
+      if (before.version > change.base_version) {
+        SELFCAL_ASSIGN_OR_RETURN(
+            before,
+            context.store()->GetCalibration(run.rig, change.base_version));
+        before.covariance = CovarianceAt(rig, before, context.options.now_ns());
+      }
       evidence.active.covariance =
-          CovarianceAfter(rig.rig, change, evidence.active, since);
+          CovarianceAfter(rig.rig, change, before, since);
       evidence.changed = ConcernedComponents(rig.rig, change.groups);
     }
   }

@@ -22,6 +22,10 @@ std::string SerializeCalibration(const StoredCalibration& calibration) {
   if (calibration.report) {
     *record.mutable_report() =
         ToProto(*calibration.report, calibration.rig, calibration.seconds);
+    if (calibration.report->covariance_of_data.size() > 0) {
+      PutMatrix(calibration.report->covariance_of_data,
+                record.mutable_covariance_of_data());
+    }
   }
   record.set_seconds(calibration.seconds);
   record.set_schema_version(calibration.schema_version);
@@ -70,7 +74,12 @@ absl::StatusOr<StoredCalibration> FromRecord(
     calibration.report->covariance = calibration.covariance;
     if (!ToTangent(calibration.theta,
                    record.components(),
-                   &calibration.report->remembered.change_sigmas)) {
+                   &calibration.report->remembered.change_sigmas) ||
+        !GetMatrix(record.covariance_of_data(),
+                   &calibration.report->covariance_of_data) ||
+        !ToTangent(calibration.theta,
+                   record.components(),
+                   &calibration.report->covariance_of_data)) {
       return DamagedRecord(what);
     }
   }

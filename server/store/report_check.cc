@@ -67,6 +67,11 @@ absl::Status CheckReported(const StoredCalibration& calibration,
     if (change.size() != 0 && change.size() != size) {
       return Bad("its change by remembered segments has another size");
     }
+    const Eigen::MatrixXd& of_data = calibration.report->covariance_of_data;
+    if (of_data.size() != 0) {
+      SELFCAL_RETURN_IF_ERROR(
+          CheckMatrix(of_data, size, "covariance of the data"));
+    }
   }
   for (const CalibrateProgress& step : calibration.steps) {
     // Older ones have no values.

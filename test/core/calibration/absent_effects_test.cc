@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
@@ -12,6 +13,8 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/calibration/noise_scale.h"
+#include "core/calibration/remembered_segment.h"
+#include "core/calibration/settled_ends.h"
 #include "core/simulation/simulate.h"
 
 namespace selfcal {
@@ -59,12 +62,40 @@ Device CalibrateDevice(const Change& effect,
   return device;
 }
 
+// The same device with the data of the first `kept` segments, remembering the
+// others.
+Device Remembering(Device device, std::size_t kept) {
+  std::vector<RememberedSegment> remembered;
+  for (std::size_t s = 0; s < device.segments.size(); ++s) {
+    const MotionSegment& segment = device.segments[s];
+    RememberedSegment& one = remembered.emplace_back();
+    one.key = segment.key;
+    one.time_ns = segment.keyframes.front().t_ns;
+    if (s < kept) continue;
+    one.ends = SummariseSettledEnds(device.rig, device.result.theta, segment);
+  }
+  device.segments.resize(kept);
+  CalibrateOptions options;
+  options.remembered = remembered;
+  device.result =
+      Calibrate(device.rig, device.rig.factory, device.segments, options);
+  EXPECT_EQ(device.result.status, CalibrateStatus::kConverged)
+      << device.result.message;
+  EXPECT_EQ(device.result.remembered.segments,
+            static_cast<int>(remembered.size() - kept))
+      << device.result.remembered.unused;
+  return device;
+}
+
 std::vector<AbsentEffect> EffectsOf(const Device& device) {
-  return TestAbsentEffects(device.rig,
-                           {device.result.theta,
-                            device.result.covariance,
-                            device.result.track_noise_factor},
-                           device.segments);
+  const bool completed = device.result.covariance_of_data.size() > 0;
+  return TestAbsentEffects(
+      device.rig,
+      {device.result.theta,
+       device.result.covariance,
+       device.result.track_noise_factor},
+      completed ? device.result.covariance_of_data : device.result.covariance,
+      device.segments);
 }
 
 std::vector<std::string> BlocksOf(const std::vector<AbsentEffect>& effects) {
@@ -133,6 +164,7 @@ TEST(AbsentEffects, AreThoseThatTheRigDoesNotEstimate) {
       (std::vector<std::string>{"imu.gyro.g_sensitivity", "cam0.line_delay"}));
   EXPECT_TRUE(TestAbsentEffects(device.rig,
                                 {device.result.theta, device.result.covariance},
+                                device.result.covariance,
                                 {})
                   .empty());
 }
@@ -175,6 +207,30 @@ TEST(AbsentEffects, AreNotTooSmallInFewSegments) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Device without = CalibrateDevice(NoEffect, seed, {}, 8);
     const Device device = CalibrateDevice(MoveAxesApart, seed, {}, 8);
+    const AbsentEffect found = MostLikely(EffectsOf(device));
+    EXPECT_EQ(found.block, "imu.accel.position");
+    const double shift =
+        BoxMinus(device.result.theta, without.result.theta)
+            .cwiseQuotient(
+                device.result.covariance.diagonal().cwiseSqrt().cwiseMax(1e-12))
+            .cwiseAbs()
+            .maxCoeff();
+    std::printf("%s %.2f sigma, shifted by at most %.2f\n",
+                found.component.c_str(),
+                found.bias_sigmas,
+                shift);
+    EXPECT_GT(found.bias_sigmas, shift / 2);
+    EXPECT_LT(found.bias_sigmas, 3 * shift);
+  }
+}
+
+// Segments without data make theta more certain, and show the same effect.
+TEST(AbsentEffects, AreNotTooSmallBesideRememberedSegments) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Device without =
+        Remembering(CalibrateDevice(NoEffect, seed, {}, 33), 4);
+    const Device device =
+        Remembering(CalibrateDevice(MoveAxesApart, seed, {}, 33), 4);
     const AbsentEffect found = MostLikely(EffectsOf(device));
     EXPECT_EQ(found.block, "imu.accel.position");
     const double shift =

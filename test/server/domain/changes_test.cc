@@ -283,6 +283,31 @@ TEST_P(ChangesTest, ASecondOneIsFoundAgainstTheCalibrationAfterTheFirst) {
   EXPECT_EQ(second->base_version, finished.version);
 }
 
+// Whatever they show, the version rests on them.
+TEST_P(ChangesTest, SegmentsThatAVersionRemembersAreNotTestedAgainstIt) {
+  constexpr int kLater = 8;
+  std::optional<StoredRun> run;
+  while (!run && next_ < 200) run = Next(zero_).started_run;
+  ASSERT_TRUE(run);
+  for (int i = 0; i < kLater; ++i) Put("a", next_ + i);
+  ASSERT_TRUE(domain_->BeginRun("a", run->run).ok());
+  StoredCalibration result = Result(rig_.factory);
+  result.report->remembered.segments = kLater;
+  result.report->remembered.newest = {"s", next_ + kLater - 1};
+  ASSERT_EQ(domain_->FinishRun("a", run->run, result)->state,
+            CalibrationState::kActive);
+  for (int i = 0; i < kLater; ++i) {
+    SegmentInformation information =
+        random_.Segment(rig_, rig_.factory, turned_);
+    information.groups = ScoreGroups(rig_, information.Lambda);
+    const auto commit = domain_->CommitScore("a", {"s", next_++}, information);
+    ASSERT_TRUE(commit.ok()) << commit.status();
+    EXPECT_FALSE(commit->change) << i;
+  }
+  // The fixture's turn is found among later ones.
+  EXPECT_GE(Shock().first_sequence, next_ - 8);
+}
+
 TEST_P(ChangesTest, ARunFromBeforeIsRejected) {
   // A run of the tables as they were before is under way.
   std::optional<StoredRun> run;
@@ -300,21 +325,39 @@ TEST_P(ChangesTest, ARunFromBeforeIsRejected) {
 // The segments of the next run are of two devices, as its result tells.
 class SplitRunTest : public ChangesTest {
  protected:
-  // `failed`: a check that rejects the result.
-  StoredCalibration FinishSplit(double without_one,
-                                const std::string& failed = "") {
+  void BeginNext() {
     std::optional<StoredRun> run;
     while (!run && next_ < 200) run = Next(zero_).started_run;
-    EXPECT_TRUE(run);
+    ASSERT_TRUE(run);
     run_ = *run;
-    EXPECT_TRUE(domain_->BeginRun("a", run->run).ok());
+    ASSERT_TRUE(domain_->BeginRun("a", run_.run).ok());
+  }
+
+  // A version that rests on all segments so far.
+  StoredCalibration FinishOnAll() {
+    BeginNext();
     StoredCalibration result = Result(rig_.factory);
-    result.report->remembered.split = {.probability = without_one / 2,
-                                       .without_one = without_one,
-                                       .newer = 3,
-                                       .first = {"s", next_ - 3},
-                                       .block = "cam0.q_CI",
-                                       .concerned = {"extrinsics"}};
+    result.report->remembered.segments = 1;
+    result.report->remembered.newest = {"s", next_ - 1};
+    const auto finished = domain_->FinishRun("a", run_.run, result);
+    EXPECT_TRUE(finished.ok()) << finished.status();
+    return finished.value_or(StoredCalibration());
+  }
+
+  // `failed`: a check that rejects the result. `first`: the index of the first
+  // segment of the second device; by default the last but two.
+  StoredCalibration FinishSplit(double without_one,
+                                const std::string& failed = "",
+                                std::optional<std::int64_t> first = {}) {
+    BeginNext();
+    StoredCalibration result = Result(rig_.factory);
+    result.report->remembered.split = {
+        .probability = without_one / 2,
+        .without_one = without_one,
+        .newer = 3,
+        .first = {"s", first.value_or(next_ - 3)},
+        .block = "cam0.q_CI",
+        .concerned = {"extrinsics"}};
     if (!failed.empty()) {
       result.state = CalibrationState::kRejected;
       result.reasons = {"It failed."};
@@ -323,7 +366,7 @@ class SplitRunTest : public ChangesTest {
       result.validation->checks = {
           {failed, 0, 0, CheckOutcome::kFailed, "It failed."}};
     }
-    const auto finished = domain_->FinishRun("a", run->run, result);
+    const auto finished = domain_->FinishRun("a", run_.run, result);
     EXPECT_TRUE(finished.ok()) << finished.status();
     return finished.value_or(StoredCalibration());
   }
@@ -343,7 +386,8 @@ TEST_P(SplitRunTest, ASureOneIsAChangeOfTheDevice) {
   const auto change = store_->GetChange("a", 1);
   ASSERT_TRUE(change.ok()) << change.status();
   EXPECT_EQ(change->first_sequence, next_ - 3 + 1);  // indices count from 0
-  EXPECT_EQ(change->base_version, run_.base_version);
+  // Version 2 rests on the first of these segments.
+  EXPECT_EQ(change->base_version, 1);
   EXPECT_EQ(change->kind, ChangeKind::kSudden);
   EXPECT_THAT(change->groups, ElementsAre("extrinsics"));
   const auto tables = store_->GetTables("a");
@@ -370,6 +414,24 @@ TEST_P(SplitRunTest, ASureOneIsAChangeOfTheDevice) {
   EXPECT_EQ(report->remembered.split->first, (SegmentKey{"s", next_ - 3}));
   EXPECT_EQ(report->remembered.split->newer, 3);
   EXPECT_THAT(report->remembered.split->concerned, ElementsAre("extrinsics"));
+}
+
+// Otherwise a segment would count twice: for what is known from before, and for
+// the estimate since.
+TEST_P(SplitRunTest, WhatRemainsKnownIsNotFromTheSegmentsSince) {
+  const StoredCalibration third = FinishOnAll();
+  const std::int64_t newest = next_ - 1;
+  const StoredCalibration fourth = FinishOnAll();
+  ASSERT_EQ(fourth.version, 4);
+  ASSERT_EQ(FinishSplit(1e-6, "", newest + 1).version, 5);
+  EXPECT_EQ(run_.base_version, 4);
+  EXPECT_EQ(store_->GetChange("a", 1)->base_version, third.version);
+}
+
+TEST_P(SplitRunTest, IfEveryVersionRestsOnThemNothingRemainsKnown) {
+  FinishOnAll();
+  FinishSplit(1e-6, "", 1);  // version 2 rests on two segments
+  EXPECT_EQ(store_->GetChange("a", 1)->base_version, 1);
 }
 
 TEST_P(SplitRunTest, WhatDoesNotFitShowsNone) {

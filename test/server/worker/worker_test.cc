@@ -98,6 +98,7 @@ TEST_F(WorkerTest, ResultAndProgressAreThoseOfCalibrateToTheBit) {
   EXPECT_EQ(BoxMinus(result.theta, expected.theta).norm(), 0);
   EXPECT_EQ(result.covariance, expected.covariance);
   EXPECT_EQ(result.Lambda, expected.Lambda);
+  EXPECT_EQ(result.covariance_of_data, expected.covariance_of_data);
   EXPECT_EQ(result.rank, expected.rank);
   EXPECT_EQ(result.final_cost, expected.final_cost);
   EXPECT_EQ(result.track_noise_factor, expected.track_noise_factor);
@@ -114,15 +115,18 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   const int size = TangentSize(rig_.factory);
   result.covariance = Eigen::MatrixXd::Identity(size, size);
   result.Lambda = result.covariance;
+  result.covariance_of_data = 2 * result.covariance;
   result.noise_scales = {{NoiseKind::kGyro, 3, 0.05, 100, 2.9, false}};
   result.segment_fits = {{{"s", 7}, 1.5, 893, {40, 25, 0.03}, "a spike"}};
   result.halves = {30, 26, 0.25};
   result.remembered = {9, 1, 2, 11, 0.75, {20, 24, 0.7}, "not at all"};
+  result.remembered.newest = {"s", 6};
   result.remembered.change_probability = 0.125;
   result.remembered.change_sigmas = Eigen::VectorXd::LinSpaced(size, 0, 1);
   const auto decoded = DecodeResult(EncodeResult(result));
   ASSERT_TRUE(decoded.has_value());
   EXPECT_EQ(decoded->status, CalibrateStatus::kStalled);
+  EXPECT_EQ(decoded->covariance_of_data, result.covariance_of_data);
   ASSERT_EQ(decoded->noise_scales.size(), 1u);
   EXPECT_EQ(decoded->noise_scales[0].used, 2.9);
   EXPECT_FALSE(decoded->noise_scales[0].converged);
@@ -133,6 +137,7 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   EXPECT_EQ(decoded->segment_fits[0].excluded, "a spike");
   EXPECT_EQ(decoded->halves.probability, 0.25);
   EXPECT_EQ(decoded->remembered.segments, 9);
+  EXPECT_EQ(decoded->remembered.newest, (SegmentKey{"s", 6}));
   EXPECT_EQ(decoded->remembered.too_far, 1);
   EXPECT_EQ(decoded->remembered.contradicting, 2);
   EXPECT_EQ(decoded->remembered.compared, 11);
