@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iomanip>
+#include <limits>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "core/calibration/theta_information.h"
 #include "core/calibration/trusted_directions.h"
 #include "core/calibration/working_point.h"
+#include "core/model/temperature.h"
 
 namespace selfcal {
 namespace {
@@ -141,6 +143,10 @@ void ReportUse(const WorkingPoint& point, CalibrationResult* result) {
   result->observations_dropped = screening.observations_dropped;
 }
 
+// Joined segments have one temperature, the mean of theirs: these are within
+// this of the first.
+constexpr double kMaxWarming_k = 1;
+
 }  // namespace
 
 CalibrationRun RunCalibration(const Rig& rig,
@@ -148,8 +154,11 @@ CalibrationRun RunCalibration(const Rig& rig,
                               const std::vector<const MotionSegment*>& segments,
                               const CalibrateOptions& options,
                               const ProgressCallback& progress) {
-  const Partitioning partitioning =
-      PartitionSegments(segments, options.merge_landmarks);
+  const Partitioning partitioning = PartitionSegments(
+      segments,
+      options.merge_landmarks,
+      HasSlopes(rig.factory) ? kMaxWarming_k
+                             : std::numeric_limits<double>::infinity());
   WorkingPoint point(
       rig, theta_start, FlattenSegments(rig, segments, partitioning), options);
   Descent descent(options, theta_start, progress, &point);

@@ -1,6 +1,7 @@
 #include "core/calibration/partition.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <utility>
 
@@ -52,6 +53,12 @@ bool Joinable(const MotionSegment& before, const MotionSegment& after) {
          before.keyframes.back().t_ns < first_ns &&
          before.imu.back().t_ns >= first_ns &&
          (before.imu1.empty() || before.imu1.back().t_ns >= first_ns);
+}
+
+// 0 if a temperature is not known.
+double Warming(const MotionSegment& before, const MotionSegment& after) {
+  if (!before.temperature_c || !after.temperature_c) return 0;
+  return std::abs(*after.temperature_c - *before.temperature_c);
 }
 
 // Appends the partitions of one session to the result.
@@ -106,20 +113,24 @@ std::vector<const MotionSegment*> SortByKey(
 }
 
 Partitioning PartitionSegments(
-    const std::vector<const MotionSegment*>& segments, int merge_landmarks) {
+    const std::vector<const MotionSegment*>& segments,
+    int merge_landmarks,
+    double max_warming_k) {
   Partitioning result;
   result.merge_landmarks = merge_landmarks;
   // The segments of one session: other sessions have separate ids, so that
   // partitions of different sessions have nothing in common whatever their
   // numbers.
   std::vector<Observers> parts;
+  int first = 0;  // of the chain of joined segments
   for (int i = 0; i < static_cast<int>(segments.size()); ++i) {
     Observers part{{i}, ObservedIds(*segments[i])};
     const bool same_session =
         i > 0 && segments[i - 1]->key.session == segments[i]->key.session;
     if (!same_session) {
       Finish(merge_landmarks, &parts, &result.partitions);
-    } else if (Joinable(*segments[i - 1], *segments[i])) {
+    } else if (Joinable(*segments[i - 1], *segments[i]) &&
+               Warming(*segments[first], *segments[i]) <= max_warming_k) {
       result.joints.push_back({i - 1, i});
       MergeInto(&parts.back(), std::move(part));
       continue;
@@ -131,6 +142,7 @@ Partitioning PartitionSegments(
       }
     }
     parts.push_back(std::move(part));
+    first = i;
   }
   Finish(merge_landmarks, &parts, &result.partitions);
   std::sort(result.partitions.begin(), result.partitions.end());

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/model/segment.h"
@@ -53,13 +54,17 @@ std::vector<const MotionSegment*> SortByKey(
     const std::vector<MotionSegment>& segments);
 
 // Partitions segments sorted by key. Two segments are joined if they belong to
-// one session, their indices are consecutive, and the samples of the first, of
-// both IMUs, extend to the first keyframe of the second. Partitions of one
+// one session, their indices are consecutive, the samples of the first, of both
+// IMUs, extend to the first keyframe of the second, and the device is not
+// warmer or colder by more than `max_warming_k` than at the first of those that
+// are joined already: joined segments share one theta. Partitions of one
 // session are merged as long as two of them observe more than merge_landmarks
 // common ids, counted over each whole partition: unlike a single pass over the
 // segments, that has one result whatever the order, and leaves no two
 // partitions over the threshold.
 Partitioning PartitionSegments(
-    const std::vector<const MotionSegment*>& segments, int merge_landmarks);
+    const std::vector<const MotionSegment*>& segments,
+    int merge_landmarks,
+    double max_warming_k = std::numeric_limits<double>::infinity());
 
 }  // namespace selfcal

@@ -32,6 +32,25 @@ TEST(Partition, DirectNeighboursAreJoined) {
   EXPECT_TRUE(result.gaps.empty());
 }
 
+// Joined segments share one theta.
+TEST(Partition, SegmentsOfADeviceThatWarmsUpAreNotJoinedForLong) {
+  std::vector<MotionSegment> segments;
+  for (int i = 0; i < 6; ++i) {
+    segments.push_back(Neighbour(i));
+    segments.back().temperature_c = 20 + 0.4 * i;
+  }
+  const Partitioning one = Partition(segments);
+  EXPECT_EQ(one.partitions, (Sets{{0, 1, 2, 3, 4, 5}}));
+  const Partitioning several = PartitionSegments(SortByKey(segments), 15, 1);
+  EXPECT_EQ(several.partitions, (Sets{{0, 1, 2}, {3, 4, 5}}));
+  EXPECT_EQ(several.joints,
+            (std::vector<SegmentJoint>{{0, 1}, {1, 2}, {3, 4}, {4, 5}}));
+  ASSERT_EQ(several.gaps.size(), 1u);
+  EXPECT_EQ(several.gaps[0].before, 2);
+  EXPECT_EQ(several.gaps[0].after, 3);
+  EXPECT_NEAR(several.gaps[0].dt_s, 0.1, 1e-12);
+}
+
 TEST(Partition, SamplesThatEndBeforeTheNextKeyframeLeaveAGap) {
   const MotionSegment cut = HandMadeSegment("a", 0, 0, 0.38, {});
   const Partitioning result = Partition({cut, Neighbour(1)});
