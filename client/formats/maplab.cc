@@ -43,10 +43,11 @@ ImuFullScale ReadFullScale(const YAML::Node& imu) {
 CameraCalibration ReadCamera(const YAML::Node& entry) {
   const YAML::Node camera = Get(entry, "camera");
   CameraCalibration result;
-  const YAML::Node distortion = Get(camera, "distortion");
+  const bool distorts = Has(camera, "distortion");
   const std::string projection =
       Has(camera, "type") ? GetText(camera, "type") : "pinhole";
-  const std::string type = GetText(distortion, "type");
+  const std::string type =
+      distorts ? GetText(Get(camera, "distortion"), "type") : "radtan";
   const auto found =
       FindModel("maplab", projection, type, [](const auto&) { return true; });
   if (!found) {
@@ -64,16 +65,20 @@ CameraCalibration ReadCamera(const YAML::Node& entry) {
       GetMatrixData(camera, "intrinsics", before + 4, 1);
   result.f = intrinsics.segment<2>(before);
   result.c = intrinsics.tail<2>();
-  result.distortion.resize(size);
+  result.distortion.setZero(size);
   result.distortion.head(before) = intrinsics.head(before);
-  result.distortion.tail(size - before) =
-      GetMatrixData(distortion, "parameters", size - before, 1);
+  if (distorts) {
+    result.distortion.tail(size - before) = GetMatrixData(
+        Get(camera, "distortion"), "parameters", size - before, 1);
+  }
   result.width_px = GetInt(camera, "image_width");
   result.height_px = GetInt(camera, "image_height");
-  const Eigen::Matrix4d T_BC =
-      Rigid(GetMatrixData(entry, "T_B_C", 4, 4), "T_B_C");
-  SetTransformFromBody(
-      RigidInverse(T_BC), Eigen::Matrix3d::Identity(), &result);
+  const auto rigid = [&](const char* key) -> Eigen::Matrix4d {
+    return Rigid(GetMatrixData(entry, key, 4, 4), key);
+  };
+  const Eigen::Matrix4d T_CB =
+      Has(entry, "T_C_B") ? rigid("T_C_B") : RigidInverse(rigid("T_B_C"));
+  SetTransformFromBody(T_CB, Eigen::Matrix3d::Identity(), &result);
   // Zero is a global shutter.
   const double line_delay_ns = GetDouble(camera, "line-delay-nanoseconds", 0);
   if (line_delay_ns != 0) result.line_delay_s = line_delay_ns / kNsPerS;

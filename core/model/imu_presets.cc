@@ -138,7 +138,7 @@ std::string Plain(std::string_view name) {
 std::span<const ImuPreset> ImuPresets() { return kPresets; }
 
 const ImuPreset* FindImuPreset(std::string_view name) {
-  const std::string plain = Plain(name);
+  const std::string plain = Plain(name) == "lsm6ds" ? "lsm6dso" : Plain(name);
   const auto found =
       std::ranges::find_if(kPresets, [&](const ImuPreset& preset) {
         return plain == preset.name ||

@@ -41,7 +41,7 @@ std::span<const ImuPreset> ImuPresets();
 
 // Finds a preset by its name or that of the part without its manufacturer:
 // "bmi055", "ICM-20948"; nullptr if there is none. Upper and lower case are the
-// same.
+// same. "LSM6DS", the series, is the LSM6DSO.
 const ImuPreset* FindImuPreset(std::string_view name);
 
 }  // namespace selfcal

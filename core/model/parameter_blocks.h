@@ -189,7 +189,7 @@ inline constexpr Block<SecondImuCalibration> kMountBlocks[] = {
       .sigma_ref = 1e-5,
       .prior_sigma = 5e-3,
       .limit = kMaxSecondOffset_s,
-      .words = "the delay of the second IMU",
+      .words = "the delay",
       .estimated = false},
      &SecondImuCalibration::time_offset_s},
 };

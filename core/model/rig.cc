@@ -1,6 +1,7 @@
 #include "core/model/rig.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <optional>
 #include <set>
@@ -14,12 +15,20 @@
 namespace selfcal {
 namespace {
 
-// Matches the components of a block; `sensor` is "imu", or "*" for all cameras.
+template <class Blocks>
+bool HasBlock(const Blocks& blocks, std::string_view name) {
+  return std::ranges::any_of(
+      blocks, [&](const auto& block) { return block.info.name == name; });
+}
+
+// Matches the components of a block; `sensor` is "imu", "cam0", or "*" for all
+// cameras.
 template <class Sensor>
 std::string Pattern(const std::string& sensor, const Block<Sensor>& block) {
   const bool scalar =
       std::holds_alternative<double Sensor::*>(block.value) ||
-      std::holds_alternative<std::optional<double> Sensor::*>(block.value);
+      std::holds_alternative<std::optional<double> Sensor::*>(block.value) ||
+      block.info.sizes == std::array{1, 0};
   return sensor + "." + std::string(block.info.name) + (scalar ? "" : ".*");
 }
 
@@ -133,7 +142,16 @@ std::vector<ParameterGroup> DefaultGroups(
     if (group == groups.end()) {
       group = groups.insert(group, {std::string(block.info.group), {}});
     }
-    group->patterns.push_back(Pattern("*", block));
+    // "*.time_offset" would be that of a second IMU as well.
+    const bool is_of_imu =
+        theta.imu1 && HasBlock(kMountBlocks, block.info.name);
+    if (!is_of_imu) {
+      group->patterns.push_back(Pattern("*", block));
+      return;
+    }
+    for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+      group->patterns.push_back(Pattern("cam" + std::to_string(j), block));
+    }
   };
   for (const auto& block : kCameraBlocks) add(block);
   for (const auto& block : kCameraSlopes) add(block);

@@ -6,7 +6,9 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -232,6 +234,7 @@ struct SensorsRun {
   // Directions that the data determines. In the others, if there are any, the
   // factory's error is far smaller than its tolerance.
   int degrees = 0;
+  std::vector<std::string> held;  // the main part of each direction
 };
 
 std::vector<MotionSegment> SegmentsOf(const Setting& setting,
@@ -296,6 +299,9 @@ std::optional<SensorsRun> RunOne(const Setting& setting,
   run.sigma = result.covariance.diagonal().cwiseSqrt();
   run.nees = NormalisedSquaredError(run.error, result.covariance).nees;
   run.degrees = result.rank;
+  for (const UnobservedDirection& direction : result.held_constant) {
+    run.held.push_back(direction.parts.front().component);
+  }
   return run;
 }
 
@@ -425,6 +431,24 @@ void AddAccuracy(const Setting& setting,
   table->Add(std::move(row));
 }
 
+// The number of runs in which each direction was held constant.
+void AddHeld(const Setting& setting,
+             const std::vector<SensorsRun>& runs,
+             ResultTable* table) {
+  std::map<std::string, long> held;
+  for (const SensorsRun& run : runs) {
+    for (const std::string& name :
+         std::set<std::string>(run.held.begin(), run.held.end())) {
+      ++held[name];
+    }
+  }
+  const auto count = static_cast<long>(runs.size());
+  if (held.empty()) table->Add({setting.name, count, "nothing", {}});
+  for (const auto& [name, times] : held) {
+    table->Add({setting.name, count, name, times});
+  }
+}
+
 ResultTable AccuracyTable() {
   std::vector<std::string> columns = {"case"};
   for (const Block& block : kBlocks) {
@@ -441,6 +465,7 @@ void RunSensors(Context* context) {
   const double duration_s = context->quick() ? 8.5 : 24.5;
   ResultTable consistency = ConsistencyTable();
   ResultTable accuracy = AccuracyTable();
+  ResultTable held({"case", "runs", "held", "in runs"});
   std::vector<double> offsets, line_delays;
   for (const Setting& setting : Settings()) {
     std::vector<std::optional<SensorsRun>> tried(runs);
@@ -458,6 +483,7 @@ void RunSensors(Context* context) {
     if (all.empty()) continue;
     AddConsistency(setting, all, &consistency);
     AddAccuracy(setting, all, &accuracy);
+    AddHeld(setting, all, &held);
     if (setting.ignored) continue;
     const auto [low, high] =
         NeesBounds(MeanDegrees(all), static_cast<int>(all.size()), 0.95);
@@ -473,6 +499,7 @@ void RunSensors(Context* context) {
   }
   context->WriteTable("consistency", consistency);
   context->WriteTable("accuracy", accuracy);
+  context->WriteTable("held", held);
   context->AtLeast("sensors.time_offset_within_3_sigma",
                    PartBelow(offsets, 3),
                    0.98,

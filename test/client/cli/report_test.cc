@@ -31,6 +31,35 @@ TEST_F(ReportCommand, WritesOneFile) {
   EXPECT_THAT(File(), HasSubstr("Calibration of device, version 2"));
 }
 
+TEST_F(ReportCommand, ShowsEveryBlockThatThereIsInItsUnit) {
+  Rig rig = ARig("device");
+  rig.factory.imu1.emplace();
+  AddEstimatedBlocks({{"*", true}}, &rig.factory);
+  const auto components = TangentComponents(rig.factory);
+  daemon_.rigs = {ToProto(rig)};
+  for (v1::Calibration& version : daemon_.calibrations) {
+    version.clear_estimates();
+    for (const TangentComponent& component : components) {
+      auto* estimate = version.add_estimates();
+      estimate->set_component(component.name);
+      estimate->set_unit(component.unit);
+      estimate->set_value(0.5);
+      estimate->set_sigma(0.01);
+    }
+  }
+  const Outcome outcome = Selfcal({"report", "device", "--output", path_});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string html = File();
+  for (const TangentComponent& component : components) {
+    EXPECT_THAT(html,
+                HasSubstr("<td>" + component.name +
+                          "</td><td class=\"number\">0.500</td>"
+                          "<td class=\"number\">0.01</td><td>" +
+                          component.unit + "</td>"));
+    EXPECT_THAT(html, HasSubstr(component.name + " over time"));
+  }
+}
+
 TEST_F(ReportCommand, OverwritesOnlyWhenAskedAndLeavesNothingHalf) {
   ASSERT_EQ(Selfcal({"report", "device", "--output", path_}).code, 0);
   const Outcome again = Selfcal({"report", "device", "--output", path_});

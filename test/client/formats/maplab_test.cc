@@ -56,6 +56,22 @@ std::string Error(const std::string& text) {
   return std::string(Import(text).status().message());
 }
 
+TEST(ImportMaplab, ACameraNeedsNoDistortionAndTheTransformOfOneDirection) {
+  const std::string distortion = R"(          distortion:
+            type: fisheye
+            parameters: {data: [0.9]}
+)";
+  const auto without = Import(Replaced(distortion, ""));
+  ASSERT_TRUE(without.ok()) << without.status();
+  const CameraCalibration& camera = without->rig.factory.cameras.at(0);
+  EXPECT_EQ(camera.model, DistortionModel::kRadialTangential);
+  EXPECT_EQ(camera.distortion, Eigen::Vector4d::Zero());
+  const auto body_in_camera = Import(Replaced("T_B_C", "T_C_B"));
+  ASSERT_TRUE(body_in_camera.ok()) << body_in_camera.status();
+  EXPECT_EQ(body_in_camera->rig.factory.cameras.at(0).p_CI,
+            Eigen::Vector3d(0.1, 0.2, 0.3));
+}
+
 TEST(ImportMaplab, ReadsNoiseCameraAndInvertsExtrinsics) {
   const auto imported = Import(kSensors);
   ASSERT_TRUE(imported.ok()) << imported.status();

@@ -2,7 +2,8 @@
 // accelerometer's axes are estimated within what the covariance claims, and
 // that an estimate which ignores positions is not. (One that ignores the
 // g-sensitivity of these devices is: its effect is below the noise of so short
-// a session, NEES 97 of 104.)
+// a session, NEES 97 of 104.) Where nothing defines the origin of the body, its
+// shift is held constant.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/symmetric_eigen.h"
 #include "core/simulation/simulate.h"
 #include "test/core/calibration/simulated_errors.h"
 
@@ -91,6 +93,59 @@ TEST_P(Coupled, IsFoundWithinItsSigmas) {
                   {"imu.accel.position", true}};
     rig.fixed = of.fixed;
     return CalibrateSimulated(rig, truth, seed);
+  });
+}
+
+// Errors along the estimated directions alone, in sigmas of the prior. What is
+// held has at least the variance of the prior, and comes last.
+Errors AlongEstimated(const Rig& rig,
+                      const Calibration& truth,
+                      const CalibrationResult& result) {
+  const std::vector<int> free = FreeComponents(rig);
+  const Eigen::VectorXd sigmas = PriorSigmas(rig)(free);
+  const Eigen::VectorXd scale = sigmas.cwiseInverse();
+  const Eigen::VectorXd error = BoxMinus(result.theta, truth)(free);
+  const SymmetricEigen eigen(
+      scale.asDiagonal() * result.covariance(free, free) * scale.asDiagonal());
+  const Eigen::MatrixXd estimated = eigen.eigenvectors().leftCols(result.rank);
+  return {estimated.transpose() * scale.cwiseProduct(error),
+          eigen.eigenvalues().head(result.rank).asDiagonal()};
+}
+
+// A common shift along three axes, of nothing but what is relative to the
+// origin.
+void ExpectOriginHeld(const std::vector<UnobservedDirection>& held) {
+  EXPECT_EQ(held.size(), 3u);
+  for (const UnobservedDirection& direction : held) {
+    EXPECT_FALSE(direction.parts.empty());
+    for (const UnobservedDirection::Part& part : direction.parts) {
+      EXPECT_TRUE(part.component.starts_with("imu.accel.position.") ||
+                  part.component.starts_with("cam0.p_CI."))
+          << part.component;
+    }
+  }
+}
+
+TEST(CoupledWithoutAnOrigin, HoldsItsShiftAndFindsTheRestWithinItsSigmas) {
+  const CoupledCase of = {
+      .name = "no_origin", .position_m = 0.05, .positions = 9};
+  ExpectConsistent(kDevices, [&](std::uint64_t seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Calibration truth = TrueCalibration(of, seed);
+    Rig rig = HandheldRig("coupled");
+    rig.factory = PerturbCalibration(truth, {}, seed);
+    rig.factory.imu.accel_position.setZero();
+    rig.blocks = {{"imu.accel.position", true}};
+    SimulationOptions options;
+    options.seed = seed;
+    options.landmarks_in_view = 60;
+    options.keyframes_per_segment = 30;
+    const CalibrationResult result =
+        Calibrate(rig, rig.factory, SimulateKind(rig, truth, options, {}));
+    EXPECT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+    EXPECT_EQ(result.rank + 3, static_cast<int>(FreeComponents(rig).size()));
+    ExpectOriginHeld(result.held_constant);
+    return AlongEstimated(rig, truth, result);
   });
 }
 

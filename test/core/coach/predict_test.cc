@@ -39,6 +39,35 @@ TEST(Predict, HasInformationForEveryMotion) {
   }
 }
 
+// Ten degrees above the reference temperature, slopes show as well.
+TEST(Predict, HasInformationAboutEveryBlockThatThereIs) {
+  Rig rig = HandheldRig("r");
+  AddSecondImu(&rig);
+  rig.blocks = {{"*", true}};
+  AddEstimatedBlocks(rig.blocks, &rig.factory);
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  PredictOptions options;
+  options.simulation.temperature_c = rig.factory.reference_temperature_c + 10;
+  const auto components = TangentComponents(rig.factory);
+  const auto size = static_cast<Eigen::Index>(components.size());
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  const Predictions predictions = Predict(rig, rig.factory, options);
+  ASSERT_EQ(predictions.motions.size(), Primitives().size());
+  for (const MotionPrediction& motion : predictions.motions) {
+    SCOPED_TRACE(motion.motion);
+    ASSERT_EQ(motion.Lambda.rows(), size);
+    ASSERT_EQ(motion.Lambda.cols(), size);
+    ASSERT_TRUE(motion.Lambda.allFinite());
+    const Eigen::VectorXd eigenvalues = SymmetricEigenvalues(
+        prior.asDiagonal() * motion.Lambda * prior.asDiagonal());
+    // Semidefinite but for rounding of the largest.
+    EXPECT_GT(eigenvalues.minCoeff(), -1e-12 * eigenvalues.maxCoeff());
+    for (Eigen::Index i = 0; i < size; ++i) {
+      EXPECT_GT(motion.Lambda(i, i), 0) << components[i].name;
+    }
+  }
+}
+
 TEST(Predict, HasNoInformationAboutFixedComponents) {
   Rig rig = HandheldRig("r");
   rig.fixed = {"imu.gyro.*"};

@@ -11,12 +11,17 @@ namespace selfcal {
 namespace {
 
 TEST(Words, EveryComponentHasItsOwn) {
+  Rig rig = RigOfCameras(4);
+  AddSecondImu(&rig);
+  AddEstimatedBlocks({{"*", true}}, &rig.factory);
   std::set<std::string> all;
-  const auto components = TangentComponents(RigOfCameras(4).factory);
+  const auto components = TangentComponents(rig.factory);
   for (const TangentComponent& component : components) {
     const std::string words = ComponentInWords(component.name);
     EXPECT_NE(words, component.name);
     EXPECT_TRUE(words.starts_with("the ")) << words;
+    // Only technical names have one.
+    EXPECT_EQ(words.find('_'), std::string::npos) << words;
     all.insert(words);
   }
   EXPECT_EQ(all.size(), components.size());

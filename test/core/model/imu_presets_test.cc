@@ -47,6 +47,8 @@ TEST(ImuPresets, AreFoundByTheNameOfThePart) {
   EXPECT_EQ(FindImuPreset("BMI055"), FindImuPreset("bmi055"));
   EXPECT_EQ(FindImuPreset("ICM-20948"), FindImuPreset("icm20948"));
   EXPECT_EQ(FindImuPreset("ICM-42688-P"), FindImuPreset("icm42688"));
+  EXPECT_EQ(FindImuPreset("LSM6DS"), FindImuPreset("lsm6dso"));
+  EXPECT_EQ(FindImuPreset("lsm6ds3"), nullptr);
   EXPECT_EQ(FindImuPreset("bosch"), nullptr);
   EXPECT_EQ(FindImuPreset(""), nullptr);
 }

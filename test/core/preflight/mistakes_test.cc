@@ -7,9 +7,12 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "core/model/camera_model.h"
 #include "core/simulation/simulate.h"
 #include "test/core/preflight/expect_found.h"
 #include "test/core/simulation/rigs.h"
@@ -64,6 +67,49 @@ TEST(Mistakes, AreFoundInMixedMotion) {
 // The four cameras look in three directions.
 TEST(Mistakes, AreFoundWithFourCameras) {
   ExpectAllFound([](int seed) { return MakeMixed(60, seed); }, RigOfCameras(4));
+}
+
+// Observations at more than 90 degrees from the axis of the first camera.
+int CountBehindCamera(const FedData& data) {
+  const CameraCalibration& camera = data.rig.factory.cameras[0];
+  int count = 0;
+  for (const MotionSegment& segment : data.segments) {
+    for (const Observation& o : segment.observations) {
+      const KeyframeState& state = segment.keyframes[o.keyframe];
+      const Eigen::Vector3d p_I =
+          state.q_GI.conjugate() *
+          (segment.landmarks[o.landmark].p_G - state.p_GI);
+      count += (camera.q_CI * p_I + camera.p_CI).z() < 0;
+    }
+  }
+  return count;
+}
+
+// One mistake about the camera, and one about its clock.
+TEST(Mistakes, AreFoundWithLensesThatSeeBeyond90Degrees) {
+  const std::set<std::string> some = {"rotation_inverted", "images_30ms_late"};
+  int lenses = 0;
+  for (const DistortionModel model : DistortionModels()) {
+    const Rig rig = LensRig(model);
+    Eigen::Vector2d z_px;
+    if (!Project(rig.factory.cameras[0], {1, 0, -0.1}, &z_px, nullptr)) {
+      continue;
+    }
+    ++lenses;
+    SCOPED_TRACE(DistortionName(model));
+    const FedData clean = Simulated(rig, *MakeMixed(60, 1), 1);
+    EXPECT_GT(CountBehindCamera(clean), 0);
+    const Diagnosis diagnosis = clean.Diagnose();
+    EXPECT_TRUE(diagnosis.findings.empty()) << Text(diagnosis);
+    std::size_t planted = 0;
+    for (const Mistake& mistake : Mistakes()) {
+      if (!some.contains(mistake.name)) continue;
+      ++planted;
+      EXPECT_TRUE(ExpectFound(mistake, clean));
+    }
+    EXPECT_EQ(planted, some.size());
+  }
+  EXPECT_GE(lenses, 4);
 }
 
 // A front end that keeps all landmarks in its first camera.

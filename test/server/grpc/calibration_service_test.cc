@@ -1,7 +1,11 @@
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <string>
+#include <utility>
 
 #include "core/model/so3.h"
+#include "server/encode/compare.h"
 #include "server/encode/encode.h"
 #include "test/server/grpc/service_test.h"
 
@@ -486,6 +490,81 @@ TEST_F(CalibrationServiceTest, VersionsAreCompared) {
   ExpectNotFound(
       calibrations_->CompareCalibrations(&missing, request, &compared),
       "rigs/r/calibrations/7");
+}
+
+// A component of each block that few rigs have, with its unit.
+constexpr std::pair<const char*, const char*> kOptionalComponents[] = {
+    {"imu.gyro.g_sensitivity.x.y", "rad s/m"},
+    {"imu.accel.position.y.z", "m"},
+    {"imu1.gyro.scale.x", "-"},
+    {"imu1.gyro.misalignment.x", "-"},
+    {"imu1.accel.scale.x", "-"},
+    {"imu1.accel.misalignment.x", "-"},
+    {"imu1.q_AI.x", "rad"},
+    {"imu1.gyro.g_sensitivity.z.x", "rad s/m"},
+    {"imu1.accel.position.z.y", "m"},
+    {"imu1.q_JI.y", "rad"},
+    {"imu1.p_JI.y", "m"},
+    {"imu1.time_offset", "s"},
+    {"cam0.time_offset", "s"},
+    {"cam0.line_delay", "s"},
+    {"cam0.time_drift", "s/s"},
+    {"imu.gyro.scale_slope.x", "1/K"},
+    {"imu.gyro.misalignment_slope.y", "1/K"},
+    {"imu.accel.scale_slope.z", "1/K"},
+    {"imu.accel.misalignment_slope.x", "1/K"},
+    {"imu.q_AI_slope.y", "rad/K"},
+    {"imu1.gyro.scale_slope.x", "1/K"},
+    {"imu1.gyro.misalignment_slope.y", "1/K"},
+    {"imu1.accel.scale_slope.z", "1/K"},
+    {"imu1.accel.misalignment_slope.x", "1/K"},
+    {"imu1.q_AI_slope.y", "rad/K"},
+    {"cam0.q_CI_slope.z", "rad/K"},
+    {"cam0.p_CI_slope.x", "m/K"},
+    {"cam0.focal_slope.y", "px/K"},
+    {"cam0.principal_slope.x", "px/K"},
+    {"cam0.distortion_slope.w", "1/K"},
+    {"cam0.time_offset_slope", "s/K"},
+};
+
+TEST_F(CalibrationServiceTest, EveryBlockThatDiffersIsComparedInItsUnit) {
+  Rig rig = TestRig("all");
+  AddSecondImu(&rig);
+  rig.blocks = {{"*", true}};
+  AddEstimatedBlocks(rig.blocks, &rig.factory);
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  const auto created = domain_->CreateRig(rig);
+  ASSERT_TRUE(created.ok()) << created.status();
+  const Eigen::VectorXd sigmas = ReferenceSigmas(rig);
+  StoredCalibration a;
+  a.rig = rig.id;
+  a.version = 1;
+  a.theta = rig.factory;
+  a.covariance = sigmas.cwiseAbs2().asDiagonal();
+  StoredCalibration b = a;
+  b.version = 2;
+  b.theta = BoxPlus(rig.factory, sigmas);
+  const auto compared = Compare(store_.get(), a, b);
+  ASSERT_TRUE(compared.ok()) << compared.status();
+  std::map<std::string, v1::CompareCalibrationsResponse::Difference> by_name;
+  for (const auto& one : compared->differences()) {
+    by_name[one.component()] = one;
+  }
+  EXPECT_EQ(by_name.size(), FreeComponents(rig).size());
+  EXPECT_EQ(compared->differences_size(), static_cast<int>(by_name.size()));
+  const auto components = TangentComponents(rig.factory);
+  for (std::size_t i = 0; i < components.size(); ++i) {
+    ASSERT_TRUE(by_name.contains(components[i].name)) << components[i].name;
+    const auto& one = by_name[components[i].name];
+    const double sigma = sigmas(static_cast<Eigen::Index>(i));
+    // Rounding: of a focal length, and of the inverse of a covariance.
+    EXPECT_NEAR(one.difference(), sigma, 1e-9 * sigma) << one.component();
+    EXPECT_NEAR(one.sigma(), std::sqrt(2) * sigma, 1e-6 * sigma)
+        << one.component();
+  }
+  for (const auto& [name, unit] : kOptionalComponents) {
+    EXPECT_EQ(by_name[name].unit(), unit) << name;
+  }
 }
 
 TEST_F(CalibrationServiceTest, EveryWatcherGetsTheNewVersion) {
