@@ -35,6 +35,7 @@ constexpr int kMaxDepth = 100;
 struct TypeLayout {
   struct Field {
     bool is_known = false;
+    WireFormatLite::WireType wire_type = WireFormatLite::WIRETYPE_VARINT;
     const Descriptor* message = nullptr;
     // Memory of an element of a list of numbers, which grows twofold.
     std::int64_t number_bytes = 0;
@@ -54,11 +55,12 @@ struct TypeLayout {
       if (fields.size() <= number) fields.resize(number + 1);
       Field& known = fields[number];
       known.is_known = true;
+      known.wire_type = WireFormatLite::WireTypeForFieldType(
+          static_cast<WireFormatLite::FieldType>(field.type()));
       known.message = field.message_type();
       if (!field.is_packable()) continue;
       known.number_bytes = 2 * SizeOf(field.cpp_type());
-      switch (WireFormatLite::WireTypeForFieldType(
-          static_cast<WireFormatLite::FieldType>(field.type()))) {
+      switch (known.wire_type) {
         case WireFormatLite::WIRETYPE_FIXED64:
           known.least_wire_bytes = 8;
           break;
@@ -93,8 +95,24 @@ class Counter {
   bool Add(const Descriptor& type, int depth) {
     const TypeLayout& layout = LayoutOf(type);
     bytes_ += layout.empty_bytes;
+    int groups = 0;  // that are open
     while (const std::uint32_t tag = in_->ReadTag()) {
-      if (!AddField(layout, tag, depth)) return false;
+      switch (WireFormatLite::GetTagWireType(tag)) {
+        case WireFormatLite::WIRETYPE_START_GROUP:
+          ++groups;
+          bytes_ += kOfUnknown;
+          break;
+        case WireFormatLite::WIRETYPE_END_GROUP:
+          --groups;
+          break;
+        default:
+          // Nothing within a group is known: the contract has none.
+          if (!AddField(groups > 0 ? Unknown() : FieldOf(layout, tag),
+                        WireFormatLite::GetTagWireType(tag),
+                        depth)) {
+            return false;
+          }
+      }
     }
     return in_->ConsumedEntireMessage();
   }
@@ -108,15 +126,30 @@ class Counter {
     return *layout;
   }
 
-  bool AddField(const TypeLayout& layout, std::uint32_t tag, int depth) {
+  static const TypeLayout::Field& Unknown() {
     static const TypeLayout::Field kUnknown;
+    return kUnknown;
+  }
+
+  // Of another form than the contract's, a field is not known.
+  static const TypeLayout::Field& FieldOf(const TypeLayout& layout,
+                                          std::uint32_t tag) {
     const auto number =
         static_cast<std::size_t>(WireFormatLite::GetTagFieldNumber(tag));
-    const TypeLayout::Field& field =
-        number < layout.fields.size() ? layout.fields[number] : kUnknown;
+    if (number >= layout.fields.size()) return Unknown();
+    const TypeLayout::Field& field = layout.fields[number];
+    const auto form = WireFormatLite::GetTagWireType(tag);
+    const bool is_packed = field.number_bytes > 0 &&
+                           form == WireFormatLite::WIRETYPE_LENGTH_DELIMITED;
+    return form == field.wire_type || is_packed ? field : Unknown();
+  }
+
+  bool AddField(const TypeLayout::Field& field,
+                WireFormatLite::WireType form,
+                int depth) {
     if (!field.is_known) bytes_ += kOfUnknown;
     std::uint64_t varint = 0;
-    switch (WireFormatLite::GetTagWireType(tag)) {
+    switch (form) {
       case WireFormatLite::WIRETYPE_VARINT:
         bytes_ += field.number_bytes;
         return in_->ReadVarint64(&varint);
@@ -128,11 +161,9 @@ class Counter {
         return in_->Skip(4);
       case WireFormatLite::WIRETYPE_LENGTH_DELIMITED:
         return AddDelimited(field, depth);
-      case WireFormatLite::WIRETYPE_START_GROUP:
-      case WireFormatLite::WIRETYPE_END_GROUP:
-        return true;  // its fields count as if they were here
+      default:
+        return false;
     }
-    return false;
   }
 
   bool AddDelimited(const TypeLayout::Field& field, int depth) {

@@ -7,6 +7,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <variant>
@@ -66,6 +67,9 @@ struct Method {
                UploadHandler,
                ExchangeHandler>
       handler;
+  // Bytes that the handler takes for what it parses from the request; null:
+  // none. Of methods with one request and one response.
+  std::function<std::int64_t(const Message& request)> work = nullptr;
 };
 
 }  // namespace selfcal::server

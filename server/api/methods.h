@@ -67,11 +67,19 @@ class Methods {
  public:
   explicit Methods(const ApiContext& context) : context_(context) {}
 
+  // `work`: Method::work.
   template <typename Request, typename Response>
   void Add(absl::StatusOr<Response> (*handler)(const ApiContext&,
                                                const Call&,
-                                               const Request&)) {
-    AddUnary(Of<Request, Response>(),
+                                               const Request&),
+           std::int64_t (*work)(const Request&) = nullptr) {
+    Method method = Of<Request, Response>();
+    if (work != nullptr) {
+      method.work = [work](const Message& request) {
+        return work(static_cast<const Request&>(request));
+      };
+    }
+    AddUnary(std::move(method),
              [context = context_, handler](
                  const Call& call, const Message& request, Message* response) {
                auto answer =
@@ -144,7 +152,8 @@ class Methods {
     return Method{nullptr,
                   &Request::default_instance(),
                   &Response::default_instance(),
-                  UnaryHandler()};
+                  UnaryHandler(),
+                  nullptr};
   }
 
   // They fill in the descriptor and the checks around the handler.

@@ -10,6 +10,7 @@
 #include "server/encode/encode_instruction.h"
 #include "server/encode/versions.h"
 #include "server/status/status_macros.h"
+#include "server/store/report.h"
 
 namespace selfcal::server {
 namespace {
@@ -49,6 +50,10 @@ absl::StatusOr<DeviceReport> ReadReport(const v1::ReportRequest& request) {
         {*number, result.refused(), SafeLine(result.message(), kMaxMessage)});
   }
   return report;
+}
+
+std::int64_t WorkOfReport(const v1::ReportRequest& request) {
+  return ParsedSizeOfRecords(request.records());
 }
 
 absl::StatusOr<v1::ReportResponse> Report(const ApiContext& context,
@@ -113,7 +118,7 @@ absl::StatusOr<v1::ListInstructionsResponse> ListInstructions(
 }  // namespace
 
 void AddUplinkMethods(Methods* methods) {
-  methods->Add(Report);
+  methods->Add(Report, WorkOfReport);
   methods->Add(CreateInstruction);
   methods->Add(ListInstructions);
 }

@@ -29,7 +29,11 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
     const std::unique_ptr<Message> request(method_.request->New());
     const std::unique_ptr<Message> response(method_.response->New());
     const auto work = TakeRequest(
-        context_, request_, [this] { return gone_.load(); }, request.get());
+        context_,
+        request_,
+        [this] { return gone_.load(); },
+        request.get(),
+        method_.work);
     absl::Status status = work.status();
     request_.Clear();
     if (status.ok()) {

@@ -81,10 +81,7 @@ absl::Status About(const std::string& what, const absl::Status& checked) {
 
 absl::StatusOr<store::ReportedRecords> Parse(const std::string& bytes) {
   store::ReportedRecords records;
-  google::protobuf::io::ArrayInputStream stream(bytes.data(),
-                                                static_cast<int>(bytes.size()));
-  if (ParsedSize(*store::ReportedRecords::descriptor(), &stream) >
-      kMaxReportedBytes) {
+  if (ParsedSizeOfRecords(bytes) > kMaxReportedBytes) {
     return BadReport("its records would take too much memory");
   }
   if (!records.ParseFromString(bytes)) {
@@ -464,6 +461,12 @@ absl::StatusOr<std::int64_t> PutEndOfReports(Connection* db,
 }
 
 }  // namespace
+
+std::int64_t ParsedSizeOfRecords(const std::string& records) {
+  google::protobuf::io::ArrayInputStream stream(
+      records.data(), static_cast<int>(records.size()));
+  return ParsedSize(*store::ReportedRecords::descriptor(), &stream);
+}
 
 absl::StatusOr<StoredRig> RigOfReport(const std::string& bytes,
                                       const std::string& rig) {

@@ -27,6 +27,9 @@ struct ReportingDevice {
   std::string program_version;
 };
 
+// Bytes that the records of a report take in memory once they are parsed.
+std::int64_t ParsedSizeOfRecords(const std::string& records);
+
 // The definition of a rig in a report that begins anew. INVALID_ARGUMENT if
 // there is none.
 absl::StatusOr<StoredRig> RigOfReport(const std::string& records,

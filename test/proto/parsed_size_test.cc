@@ -99,6 +99,25 @@ TEST(ParsedSize, FieldsThatAreNotKnownCount) {
   }
 }
 
+// Of another form than the contract has, and in groups, of which it has none.
+TEST(ParsedSize, FieldsOfAnotherFormCount) {
+  // CreateRigRequest.rig and Rig.name (both 1) as numbers, fixed ones and
+  // groups; GetRigRequest.name in a group.
+  for (const std::string& field : {std::string("\x08\x01", 2),
+                                   std::string("\x0d\0\0\0\0", 5),
+                                   std::string("\x09\0\0\0\0\0\0\0\0", 9),
+                                   std::string("\x0b\x0c", 2),
+                                   std::string("\x7b\x0a\0\x0a\0\x7c", 6)}) {
+    const std::string bytes = Repeated(field, 1000);
+    EXPECT_GE(SizeOf<v1::CreateRigRequest>(bytes),
+              Actual<v1::CreateRigRequest>(bytes));
+    EXPECT_GE(SizeOf<v1::GetRigRequest>(bytes),
+              Actual<v1::GetRigRequest>(bytes));
+    // The bytes, not only the message without its fields.
+    EXPECT_GE(Actual<v1::GetRigRequest>(bytes), 16'000);
+  }
+}
+
 // Otherwise a segment would wait for memory that it does not need.
 TEST(ParsedSize, OfASegmentIsBelowFourTimesItsBytes) {
   RandomValues random(2);
@@ -110,21 +129,37 @@ TEST(ParsedSize, OfASegmentIsBelowFourTimesItsBytes) {
 }
 
 // Whatever the bytes, it ends, and reads nothing beyond them.
-TEST(ParsedSize, OfAnythingElseIsANumber) {
+TEST(ParsedSize, OfAnythingElseIsThatOfWhatCanBeRead) {
+  // The last field may claim any length that a message can have, of numbers
+  // that take 16 bytes each; what comes before it takes less than this for each
+  // of its bytes.
+  constexpr std::int64_t kLongestField = std::int64_t{16} << 31;
+  constexpr std::int64_t kOfOneByte = 1000;
   RandomValues random(3);
   const std::string good = ToProto(random.Segment()).SerializeAsString();
+  const std::int64_t whole = SizeOf<v1::MotionSegment>(good);
+  const std::int64_t empty = Actual<v1::MotionSegment>("");
   for (int i = 0; i < 2000; ++i) {
     std::string bytes = good.substr(0, random.Int(0, 400));
-    if (!bytes.empty()) {
-      bytes[random.Int(0, static_cast<int>(bytes.size()) - 1)] =
-          static_cast<char>(random.Int(0, 255));
-    }
-    EXPECT_GE(SizeOf<v1::MotionSegment>(bytes), 0);
+    const std::int64_t cut = SizeOf<v1::MotionSegment>(bytes);
+    EXPECT_GE(cut, empty);
+    EXPECT_LE(cut, whole);
+    if (bytes.empty()) continue;
+    bytes[random.Int(0, static_cast<int>(bytes.size()) - 1)] =
+        static_cast<char>(random.Int(0, 255));
+    const std::int64_t damaged = SizeOf<v1::MotionSegment>(bytes);
+    EXPECT_GE(damaged, empty);
+    EXPECT_LE(damaged,
+              empty + kOfOneByte * static_cast<std::int64_t>(bytes.size()) +
+                  kLongestField);
   }
-  // Deeper than protobuf reads.
+  // Deeper than protobuf reads. Each of the groups that are not known is an
+  // UnknownField and an UnknownFieldSet.
   std::string deep;
   for (int i = 0; i < 1000; ++i) deep = Repeated("\x7b", 1) + deep + "\x7c";
-  EXPECT_GE(SizeOf<v1::GetRigRequest>(deep), 0);
+  EXPECT_GE(SizeOf<v1::GetRigRequest>(deep), 1000 * (16 + 24));
+  EXPECT_LE(SizeOf<v1::GetRigRequest>(deep),
+            kOfOneByte * static_cast<std::int64_t>(deep.size()));
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ std::string Field(int number, const std::string& bytes) {
 }
 
 // Two bytes for each field that the program does not know, or for each empty
-// camera of a rig, become a hundred or more: gigabytes.
+// camera of a rig or table of a report, become a hundred or more: gigabytes.
 TEST_F(CompressedMessages, NorAreManyElementsParsed) {
   constexpr int kElements = 15 << 20;  // 30 MiB
   constexpr int kAllowedMiB = 200;     // a few copies of the bytes
@@ -86,7 +86,11 @@ TEST_F(CompressedMessages, NorAreManyElementsParsed) {
   const std::string camera(std::string("\x12\0", 2));
   const std::string rig =
       Field(1, Field(2, Repeated(camera, kElements)));  // factory.cameras
+  // records.tables, within the bytes of a report
+  const std::string report =
+      Field(5, Repeated(std::string("\x0a\0", 2), kElements));
   const std::pair<const char*, const std::string*> requests[] = {
+      {"/selfcal.v1.UplinkService/Report", &report},
       {"/selfcal.v1.RigService/GetRig", &unknown},
       {"/selfcal.v1.RigService/CreateRig", &rig},
       {"/selfcal.v1.SegmentService/StreamSegments", &unknown},
