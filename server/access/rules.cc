@@ -12,6 +12,8 @@ namespace {
 
 using google::protobuf::Message;
 
+constexpr std::string_view kRigs = "rigs/";
+
 // Returns the string at a path such as "rig.name"; empty if a message on the
 // path is missing.
 std::string TextAt(const Message& message, std::string_view path) {
@@ -27,7 +29,6 @@ std::string TextAt(const Message& message, std::string_view path) {
 // Returns the {rig} of "rigs/{rig}" and "rigs/{rig}/..."; empty for other
 // forms.
 std::string RigOf(std::string_view name) {
-  constexpr std::string_view kRigs = "rigs/";
   if (!name.starts_with(kRigs)) return "";
   name.remove_prefix(kRigs.size());
   return std::string(name.substr(0, name.find('/')));
@@ -77,13 +78,17 @@ absl::StatusOr<bool> Passes(const Caller& caller,
                             const v1::AccessRule& rule,
                             Role role,
                             const Message& request,
-                            const LabelsOf& labels_of) {
+                            const LabelsOf& labels_of,
+                            const std::string& rig_of_stream) {
   const std::optional<RigRights> rights = RightsOf(caller, role);
   if (!rights) return true;  // on every rig
   if (rights->empty()) return false;
   if (rule.rig_field().empty()) return rule.limited_to_rights();
   for (const std::string& field : rule.rig_field()) {
-    const std::string name = TextAt(request, field);
+    std::string name = TextAt(request, field);
+    if (name.empty() && !rig_of_stream.empty()) {
+      name = std::string(kRigs) + rig_of_stream;
+    }
     if (name.empty()) continue;
     const auto includes = IncludeNamed(*rights, name, rule, request, labels_of);
     if (!includes.ok() || !*includes) return includes;
@@ -109,7 +114,8 @@ std::optional<Role> RoleOf(v1::AccessRule::Role role) {
 absl::Status Authorise(const Caller& caller,
                        const google::protobuf::MethodDescriptor& method,
                        const Message& request,
-                       const LabelsOf& labels_of) {
+                       const LabelsOf& labels_of,
+                       const std::string& rig_of_stream) {
   const v1::AccessRule& rule = method.options().GetExtension(v1::access);
   if (rule.role() == v1::AccessRule::ANYBODY) return absl::OkStatus();
   const std::optional<Role> role = RoleOf(rule.role());
@@ -117,7 +123,8 @@ absl::Status Authorise(const Caller& caller,
     return absl::PermissionDeniedError(
         "nobody may call this method: it has no access rule");
   }
-  const auto passes = Passes(caller, rule, *role, request, labels_of);
+  const auto passes =
+      Passes(caller, rule, *role, request, labels_of, rig_of_stream);
   if (!passes.ok()) return passes.status();
   if (*passes) return absl::OkStatus();
   std::string message = "this needs the role '";

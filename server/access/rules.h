@@ -24,14 +24,16 @@ using LabelsOf =
 
 // Returns OK if the caller may make the call with this request; otherwise
 // PERMISSION_DENIED with a message that names the missing role, or the error of
-// `labels_of`. If the name of the rig is empty in the request, the role on any
-// rig is sufficient: in a stream the name in the first message applies to later
-// ones, a method that is limited to rights answers for the rigs of the caller
-// alone, and no other method accepts an empty name.
+// `labels_of`. If the name of the rig is empty in the request, that of
+// `rig_of_stream` applies, which the first message of a stream named; if that
+// is empty as well, the role on any rig is sufficient: a method that is limited
+// to rights answers for the rigs of the caller alone, and no other method
+// accepts an empty name.
 absl::Status Authorise(const Caller& caller,
                        const google::protobuf::MethodDescriptor& method,
                        const google::protobuf::Message& request,
-                       const LabelsOf& labels_of);
+                       const LabelsOf& labels_of,
+                       const std::string& rig_of_stream = "");
 
 // The {rig} that the request names, by the rule of its method; empty if the
 // request names none, or several.

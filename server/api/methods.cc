@@ -5,10 +5,12 @@
 
 #include <array>
 #include <map>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "server/access/grants.h"
 #include "server/access/rules.h"
 #include "server/api/rig_watches.h"
 #include "server/status/status_macros.h"
@@ -21,17 +23,19 @@ using google::protobuf::MethodDescriptor;
 absl::Status Authorised(const ApiContext& context,
                         const Call& call,
                         const MethodDescriptor& method,
-                        const Message& request) {
-  absl::Status status =
-      Authorise(call.caller,
-                method,
-                request,
-                [&context](const std::string& rig)
-                    -> absl::StatusOr<std::map<std::string, std::string>> {
-                  SELFCAL_ASSIGN_OR_RETURN(const StoredRig stored,
-                                           context.store->GetRig(rig));
-                  return stored.labels;
-                });
+                        const Message& request,
+                        const std::string& rig_of_stream = "") {
+  absl::Status status = Authorise(
+      call.caller,
+      method,
+      request,
+      [&context](const std::string& rig)
+          -> absl::StatusOr<std::map<std::string, std::string>> {
+        SELFCAL_ASSIGN_OR_RETURN(const StoredRig stored,
+                                 context.store->GetRig(rig));
+        return stored.labels;
+      },
+      rig_of_stream);
   if (!status.ok()) {
     spdlog::debug("denied to '{}': {}", call.caller.name, method.full_name());
   }
@@ -76,8 +80,11 @@ class AuthorisedExchange final : public Exchange {
 
   void Take(const Message& request, const Done& done) override {
     const absl::Status refused = Guarded(context_, [&] {
-      const absl::Status may = Authorised(context_, call_, method_, request);
+      // Each time, since the labels of a rig may change.
+      const absl::Status may =
+          Authorised(context_, call_, method_, request, rig_);
       if (!may.ok()) return may;
+      if (rig_.empty()) rig_ = RigOf(method_, request);
       exchange_->Take(request, done);
       return absl::OkStatus();
     });
@@ -90,6 +97,7 @@ class AuthorisedExchange final : public Exchange {
   const MethodDescriptor& method_;
   const Message& response_;
   std::unique_ptr<Exchange> exchange_;
+  std::string rig_;  // that the first request named
 };
 
 }  // namespace
@@ -154,6 +162,14 @@ void Methods::AddWatch(Method method, WatchHandler handler) {
       absl::Status status = Authorised(context, call, *this_method, request);
       if (!status.ok()) return status;
       const std::string rig = RigOf(*this_method, request);
+      const auto rights = RightsOf(call.caller, Role::kRead);
+      if (rights && !rights->labels.empty()) {
+        const std::shared_ptr<Message> same(request.New());
+        same->CopyFrom(request);
+        queue->SetGate([context, call, this_method, same] {
+          return Authorised(context, call, *this_method, *same);
+        });
+      }
       // Registered first: a rig that is deleted meanwhile is not missed.
       std::shared_ptr<void> of_rig;
       if (!rig.empty()) {

@@ -8,6 +8,11 @@ namespace selfcal::server {
 WatchQueue::WatchQueue(std::function<void()> arrived)
     : notify_(std::move(arrived)) {}
 
+void WatchQueue::SetGate(std::function<absl::Status()> gate) {
+  const std::lock_guard lock(mutex_);
+  gate_ = std::move(gate);
+}
+
 void WatchQueue::Put(const std::string& key, Encode update) {
   {
     const std::lock_guard lock(mutex_);
@@ -54,6 +59,14 @@ WatchQueue::Taken WatchQueue::TakeLocked() {
   if (updates_.empty()) return {nullptr, closed_, status_};
   Taken taken{std::move(updates_.front().encode), false, absl::OkStatus()};
   updates_.pop_front();
+  if (gate_) {
+    taken.update = [gate = gate_, update = std::move(taken.update)]()
+        -> absl::StatusOr<std::shared_ptr<const WatchUpdate>> {
+      const absl::Status passes = gate();
+      if (!passes.ok()) return passes;
+      return update();
+    };
+  }
   return taken;
 }
 

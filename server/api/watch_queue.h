@@ -30,6 +30,9 @@ class WatchQueue {
   // update or the end. It must return at once and must not take.
   explicit WatchQueue(std::function<void()> arrived = nullptr);
 
+  // A check that each update has to pass when it is about to be sent; an error
+  // ends the watch. For a reader whose rights may change.
+  void SetGate(std::function<absl::Status()> gate);
   // Adds an update. It replaces the waiting update of the same key, so that a
   // slow reader gets the newest. Beyond kCapacity waiting updates the oldest is
   // dropped, unless there is a summary.
@@ -64,6 +67,7 @@ class WatchQueue {
   std::mutex mutex_;  // guards what follows
   std::condition_variable arrived_;
   std::deque<Update> updates_;
+  std::function<absl::Status()> gate_;
   Encode summary_;
   bool closed_ = false;
   absl::Status status_;

@@ -217,5 +217,50 @@ TEST_F(LimitedCallerTest, WatchTellsOfTheRigsOfTheCallerAlone) {
   context.TryCancel();
 }
 
+// What it has not been sent by then, it does not get.
+TEST_F(LimitedCallerTest, AWatchEndsOnceItsRigHasLostTheLabel) {
+  Context context;
+  context.set_deadline(std::chrono::system_clock::now() + kAnswered);
+  v1::WatchCalibrationRequest request;
+  request.set_parent(std::string("rigs/") + kShown);
+  const auto stub = v1::CalibrationService::NewStub(As("label"));
+  const auto watch = stub->WatchCalibration(&context, request);
+  v1::Calibration update;
+  ASSERT_TRUE(watch->Read(&update));
+  const auto publish = [&] {
+    const auto run = domain_->CreateManualRun(kShown, true);
+    ASSERT_TRUE(run.ok()) << run.status();
+    pipeline_->Publish(FinishRun(TestRig(kShown), run->run));
+  };
+  publish();
+  ASSERT_TRUE(watch->Read(&update));
+  SetSite(kShown, "west");
+  publish();
+  EXPECT_FALSE(watch->Read(&update));
+  EXPECT_EQ(watch->Finish().error_code(), grpc::StatusCode::PERMISSION_DENIED);
+}
+
+TEST_F(LimitedCallerTest, AStreamEndsOnceItsRigHasLostTheLabel) {
+  Context context;
+  context.set_deadline(std::chrono::system_clock::now() + kAnswered);
+  const auto stub = v1::SegmentService::NewStub(As("label"));
+  const auto stream = stub->StreamSegments(&context);
+  const std::vector<MotionSegment> segments = TestSegments(TestRig(kShown), 3);
+  v1::StreamSegmentsResponse response;
+  const auto send = [&](std::size_t s, const std::string& parent) {
+    v1::StreamSegmentsRequest message;
+    message.set_parent(parent);
+    *message.mutable_segment() = ToProto(segments[s]);
+    return stream->Write(message) && stream->Read(&response);
+  };
+  ASSERT_TRUE(send(1, std::string("rigs/") + kShown));
+  SetSite(kShown, "west");
+  // Even if it does not name its rig again.
+  EXPECT_FALSE(send(2, ""));
+  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_TRUE(
+      absl::IsNotFound(store_->GetSegment(kShown, segments[2].key).status()));
+}
+
 }  // namespace
 }  // namespace selfcal::server
