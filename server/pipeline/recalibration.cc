@@ -268,6 +268,8 @@ absl::StatusOr<Execution> Recalibrator::ExecuteAll(Executor* executor) {
   for (bool any = true; any && worst != Execution::kTryLater;) {
     any = false;
     SELFCAL_RETURN_IF_ERROR(StartDueRuns());
+    const auto again =
+        std::chrono::steady_clock::now() + shared_.options.recheck;
     SELFCAL_ASSIGN_OR_RETURN(
         const std::vector<StoredRun> runs,
         shared_.store()->ListUnfinishedRuns(shared_.claims->replica()));
@@ -275,6 +277,8 @@ absl::StatusOr<Execution> Recalibrator::ExecuteAll(Executor* executor) {
       const Execution executed = ExecuteOwn(executor, run);
       worst = std::max(worst, executed);
       any |= executed == Execution::kDone && executor->current.open();
+      // However many runs there are, others may be due.
+      if (any && std::chrono::steady_clock::now() >= again) break;
     }
   }
   return worst;

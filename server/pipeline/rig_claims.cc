@@ -211,7 +211,6 @@ absl::Status RigClaims::Review() {
       if (busy.contains(rig)) held.idle_since = now;
       if (now - held.idle_since > kKeep) idle.push_back(held.claim);
     }
-    for (const RigClaim& claim : idle) held_.erase(claim.rig);
     busy_ = static_cast<int>(busy.size());
   }
   // A claim, or its release, whose outcome was not known: with the number of
@@ -220,6 +219,11 @@ absl::Status RigClaims::Review() {
     if (!Holds(claim)) SELFCAL_RETURN_IF_ERROR(Claim(claim.rig));
   }
   for (const RigClaim& claim : idle) {
+    if (Clock::now() >= next_beat_) break;  // after the next beat
+    {
+      const std::lock_guard lock(mutex_);
+      held_.erase(claim.rig);
+    }
     const absl::Status released = store_->replicas()->Release(claim);
     // A rig that was deleted has no claim any more.
     if (!released.ok() && !absl::IsNotFound(released)) return released;

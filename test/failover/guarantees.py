@@ -127,15 +127,22 @@ def _partition(context, tried, load, number, devices, databases) -> None:
     length = random.uniform(*seconds)
     sender = Sender(context, f"library-{context.rounds}-{number}", devices.port)
     time.sleep(random.uniform(0, 1.5))
-    for proxy in proxies:
-        how(proxy)
-    time.sleep(length)
-    begin = time.monotonic()
-    for proxy in proxies:
-        proxy.heal()
     verb = "dropped" if how is Proxy.drop else "stalled"
     what = f"{where}: {verb} for {length:.1f} s"
-    _wait_until_back(tried, load, begin, what, 0)
+    begin = time.monotonic()
+    for proxy in proxies:
+        how(proxy)
+    if where.startswith("one"):
+        # The others serve its devices meanwhile.
+        what = f"{where}: {verb}"
+        _wait_until_back(tried, load, begin, what, 0)
+    else:
+        time.sleep(length)
+        begin = time.monotonic()
+    for proxy in proxies:
+        proxy.heal()
+    if not where.startswith("one"):
+        _wait_until_back(tried, load, begin, what, 0)
     for text in sender.finish():
         tried.fail(f"{what}: {text}")
 

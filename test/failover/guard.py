@@ -41,9 +41,10 @@ def main() -> None:
         signal.signal(number, signal.SIG_IGN)
     sys.stdin.buffer.read()
     send(signal.SIGCONT, processes_of(folder))
-    if (pathlib.Path(folder) / "fleet/etc").exists():
-        command = [stop, f"{folder}/fleet"]
-        subprocess.run(command, check=False, stdout=subprocess.DEVNULL)
+    for fleet in ("fleet", "archived"):
+        if (pathlib.Path(folder) / fleet / "etc").exists():
+            command = [stop, f"{folder}/{fleet}"]
+            subprocess.run(command, check=False, stdout=subprocess.DEVNULL)
     # A start that was interrupted, and what else the test had begun.
     deadline = time.monotonic() + 20
     while (left := processes_of(folder)) and time.monotonic() < deadline:

@@ -23,9 +23,9 @@ class RunningFleet:
         self._stores: dict = {}
         self._link = None
 
-    def create(self, replicas: int) -> None:
+    def create(self, replicas: int, archive: bool = False) -> None:
         options = ["--replicas", str(replicas), "--daemon", self._daemon]
-        self._start([*options, "--no-archive"])
+        self._start(options if archive else [*options, "--no-archive"])
         self._fleet.load()
 
     def repair(self) -> None:

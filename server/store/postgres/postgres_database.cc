@@ -33,6 +33,11 @@ constexpr char kLimitWrites[] =
     "SET idle_in_transaction_session_timeout = '10s';"
     "SET lock_timeout = '5s'";
 
+// Pages of lists take some ten milliseconds. What takes this long, a filter
+// that no index serves, must not hold the few connections that read for longer
+// than other daemons wait for a sign of life (ReplicaOptions::lease).
+constexpr char kLimitReads[] = "SET statement_timeout = '5s'";
+
 // A number of its own for each thread that calls.
 std::size_t NumberOfThread() {
   static std::atomic<std::size_t> next = 0;
@@ -104,7 +109,8 @@ absl::Status PostgresDatabase::CarryOut(
     if (*connection == nullptr || (*connection)->lost()) {
       connection->reset();  // before the next one counts
       SELFCAL_ASSIGN_OR_RETURN(auto opened, Connect());
-      if (!is_read) SELFCAL_RETURN_IF_ERROR(opened->Execute(kLimitWrites));
+      SELFCAL_RETURN_IF_ERROR(
+          opened->Execute(is_read ? kLimitReads : kLimitWrites));
       *connection = std::move(opened);
     }
     PostgresConnection* const db = connection->get();

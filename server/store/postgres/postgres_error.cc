@@ -64,8 +64,9 @@ constexpr Meaning kMeanings[] = {
      "was changed"},
     {"57014",
      absl::StatusCode::kUnavailable,
-     "the database server cancelled the statement: check its time limits, and "
-     "try again; nothing was changed"},
+     "the database server cancelled the statement, which took too long: ask "
+     "for "
+     "less, such as the rigs of one label, and try again; nothing was changed"},
     {"57",
      absl::StatusCode::kUnavailable,
      "the database server is stopping or starting: try again"},

@@ -273,6 +273,17 @@ TEST_F(PostgresDatabaseTest, AWriteThatLosesItsConnectionIsCarriedOutOnce) {
   EXPECT_EQ(Stored(database_.get()), (std::vector<int>{1}));
 }
 
+// It holds up nothing for longer than others wait.
+TEST_F(PostgresDatabaseTest, AReadThatTakesTooLongIsEnded) {
+  const auto begin = std::chrono::steady_clock::now();
+  const absl::Status status = database_->Read(
+      [](Connection* db) { return db->Execute("SELECT pg_sleep(60)"); });
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(40));
+  EXPECT_TRUE(absl::IsUnavailable(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("took too long"));
+  EXPECT_EQ(Stored(database_.get()), (std::vector<int>{}));
+}
+
 // The server ends the connection while it commits, and does not commit.
 TEST_F(PostgresDatabaseTest, ACommitThatIsLostIsNotASuccess) {
   ASSERT_TRUE(

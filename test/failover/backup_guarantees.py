@@ -1,0 +1,102 @@
+"""What a backup and the archive bring back."""
+
+import pathlib
+import subprocess
+import time
+
+from hub import processes
+from hub.one_machine import ADDRESS
+
+from failover import checks
+from failover.device import Device
+from failover.load import Context
+from failover.running_fleet import RunningFleet
+from failover.tried import Tried, wait
+from selfcal.v1 import rig_pb2
+
+_FLEET = pathlib.Path(__file__).resolve().parents[2] / "deploy/fleet"
+_SEGMENTS = 12  # of a rig
+_SENT_S = 120
+
+
+def restore(context: Context, tried: Tried, trials: int) -> None:
+    """On a fleet of its own, with an archive."""
+    tried.after = "serves again"
+    folder = context.fleet.folder.with_name("archived")
+    fleet = RunningFleet(folder, context.program)
+    try:
+        fleet.create(replicas=1, archive=True)
+        for number in range(trials):
+            _restore(context, fleet, tried, number)
+    finally:
+        _command("stop", folder)
+
+
+def _restore(
+    context: Context, fleet: RunningFleet, tried: Tried, number: int
+) -> None:
+    in_backup = _send(context, fleet, tried, f"backup-{number}")
+    _command("backup", fleet.folder, "--type", "incr" if number else "full")
+    in_archive = _send(context, fleet, tried, f"archive-{number}")
+    for text in checks.settled(fleet, [d.rig_id for d in (in_backup, in_archive)]):
+        tried.fail(text)
+    restore_to = str(fleet.query("SELECT clock_timestamp()")[0][0])
+    time.sleep(1)
+    later = _send(context, fleet, tried, f"later-{number}")
+
+    begin = time.monotonic()
+    _command("restore", fleet.folder, restore_to)
+    fleet.repair()
+    tried.seconds.append(time.monotonic() - begin)
+    rigs = {row[0] for row in fleet.query("SELECT id FROM rigs")}
+    if later.rig_id in rigs:
+        tried.fail(f"rig {later.rig_id} is of after {restore_to}")
+    with checks.connect(fleet) as daemon:
+        for device in (in_backup, in_archive):
+            for text in checks.segments(fleet, device):
+                tried.fail(text)
+            for text in checks.data(daemon, device, all_kept=True):
+                tried.fail(text)
+    after = _send(context, fleet, tried, f"after-{number}")
+    for text in checks.settled(fleet, [after.rig_id]):
+        tried.fail(text)
+    for text in checks.segments(fleet, after):
+        tried.fail(text)
+    devices = (in_backup, in_archive, later, after)
+    tried.segments += sum(len(device.acknowledged) for device in devices)
+    tried.trial(f"taken back to {restore_to}")
+    tried.checked = tried.trials
+
+
+def _send(
+    context: Context, fleet: RunningFleet, tried: Tried, rig_id: str
+) -> Device:
+    """A device all of whose segments are acknowledged; their data stays."""
+    rig = rig_pb2.Rig()
+    rig.CopyFrom(context.source.rig)
+    rig.ClearField("create_time")
+    rig.name = f"rigs/{rig_id}"
+    rig.table_size = 1000
+    rig.min_gain_nats = 0
+    checks.create_rig(fleet, rig)
+    target = f"{ADDRESS}:{fleet.service_port}"
+    device = Device(target, rig, context.source, 20, _SEGMENTS)
+    device.start()
+    if not wait(lambda: len(device.acknowledged) == _SEGMENTS, _SENT_S):
+        tried.fail(f"rig {rig_id}: {device.waiting()} are not acknowledged")
+    device.abandon()
+    device.join()
+    return device
+
+
+def _command(name: str, folder: pathlib.Path, *options: str) -> None:
+    done = subprocess.run(
+        [_FLEET / name, folder, *options],
+        check=False,
+        cwd=folder.parent,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+    if done.returncode != 0:
+        raise processes.Failed(f"{name}: {done.stdout}")
