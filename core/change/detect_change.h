@@ -45,9 +45,10 @@ struct ChangeOptions {
   friend bool operator==(const ChangeOptions&, const ChangeOptions&) = default;
 };
 
+// The numbers are those on disk and never change.
 enum class ChangeKind {
-  kSudden,  // one step
-  kDrift,   // grew over the window
+  kSudden = 1,  // one step
+  kDrift = 2,   // grew over the window
 };
 
 struct Change {

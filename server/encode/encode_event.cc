@@ -9,8 +9,7 @@ v1::Event Encode(const StoredEvent& event) {
   message.set_number(event.event);
   SetTime(event.time_ns, message.mutable_time());
   if (!event.rig.empty()) message.set_rig(RigName(event.rig));
-  message.set_kind(
-      static_cast<v1::Event::Kind>(static_cast<int>(event.kind) + 1));
+  message.set_kind(static_cast<v1::Event::Kind>(static_cast<int>(event.kind)));
   message.set_detail(event.detail);
   return message;
 }

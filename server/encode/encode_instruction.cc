@@ -8,6 +8,18 @@
 namespace selfcal::server {
 namespace {
 
+v1::Instruction::State EncodeInstructionState(InstructionState state) {
+  switch (state) {
+    case InstructionState::kPending:
+      return v1::Instruction::PENDING;
+    case InstructionState::kDone:
+      return v1::Instruction::DONE;
+    case InstructionState::kRefused:
+      return v1::Instruction::REFUSED;
+  }
+  return v1::Instruction::PENDING;
+}
+
 // The field of its request; null if it has none.
 const google::protobuf::FieldDescriptor* FieldOf(
     const v1::Instruction& instruction) {
@@ -30,8 +42,7 @@ absl::StatusOr<v1::Instruction> Encode(const StoredInstruction& instruction) {
                              std::to_string(instruction.instruction)));
   SetTime(instruction.create_time_ns, message.mutable_create_time());
   message.set_caller(instruction.caller);
-  message.set_state(
-      static_cast<v1::Instruction::State>(static_cast<int>(instruction.state)));
+  message.set_state(EncodeInstructionState(instruction.state));
   message.set_message(instruction.message);
   if (instruction.end_time_ns != 0) {
     SetTime(instruction.end_time_ns, message.mutable_end_time());

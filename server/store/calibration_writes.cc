@@ -21,7 +21,7 @@ absl::Status InsertContent(UnitOfWork* tx,
              "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
              tx->rig_row(),
              calibration.version,
-             static_cast<int>(calibration.state) + 1,
+             static_cast<int>(calibration.state),
              calibration.create_time_ns,
              calibration.run,
              BlobView{content},
@@ -76,8 +76,8 @@ absl::Status WriteState(UnitOfWork* tx,
                    "WHERE rig = ?1 AND version = ?2 AND state = ?3",
                    tx->rig_row(),
                    version,
-                   static_cast<int>(from) + 1,
-                   static_cast<int>(to) + 1)
+                   static_cast<int>(from),
+                   static_cast<int>(to))
       .Run();
 }
 

@@ -108,7 +108,7 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(
   SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration,
                            ParseColumns(row, 4, rig, version, parse));
   calibration.rig_key = rig_id;
-  calibration.state = static_cast<CalibrationState>(row.Int(1) - 1);
+  calibration.state = static_cast<CalibrationState>(row.Int(1));
   calibration.create_time_ns = row.Int(2);
   if (!row.IsNull(3)) {
     calibration.run = row.Int(3);

@@ -28,7 +28,7 @@ absl::StatusOr<StoredChange> ReadChange(Connection* db,
   change.rig = rig;
   change.change = number;
   change.time_ns = read.Int(0);
-  change.kind = static_cast<ChangeKind>(read.Int(1) - 1);
+  change.kind = static_cast<ChangeKind>(read.Int(1));
   change.first_sequence = read.Int(2);
   change.base_version = read.Int(3);
   change.inflation = read.Double(4);
@@ -66,7 +66,7 @@ absl::Status InsertChange(UnitOfWork* tx, const StoredChange& change) {
                 tx->rig_row(),
                 change.change,
                 change.time_ns,
-                static_cast<int>(change.kind) + 1,
+                static_cast<int>(change.kind),
                 change.first_sequence,
                 change.base_version,
                 change.inflation)

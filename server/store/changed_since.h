@@ -1,4 +1,4 @@
-// What tells that a version is of the device before it changed.
+// SQL that finds the device change that makes a version outdated.
 #pragma once
 
 namespace selfcal::server {

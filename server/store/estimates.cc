@@ -152,7 +152,7 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
     listed.items.push_back({read.Text(0),
                             read.Int(1),
                             read.Int(2),
-                            static_cast<CalibrationState>(read.Int(3) - 1),
+                            static_cast<CalibrationState>(read.Int(3)),
                             read.Text(4),
                             read.Text(5),
                             read.Double(6),

@@ -61,7 +61,7 @@ absl::StatusOr<Listed<StoredEvent>> ReadEvents(Statement* read) {
     listed.items.push_back({read->Int(0),
                             read->Int(1),
                             read->Text(2),
-                            static_cast<EventKind>(read->Int(3) - 1),
+                            static_cast<EventKind>(read->Int(3)),
                             read->Text(4),
                             read->Int(5)});
   }
@@ -163,7 +163,7 @@ absl::StatusOr<std::int64_t> InsertEvent(Connection* db,
                         event.rig,
                         event.time_ns,
                         event.steady_ns,
-                        static_cast<int>(event.kind) + 1,
+                        static_cast<int>(event.kind),
                         event.detail));
     if (number != 0) return number;
     // No lock protects the numbers of the daemon's events: another one has
@@ -172,7 +172,7 @@ absl::StatusOr<std::int64_t> InsertEvent(Connection* db,
 }
 
 absl::Status InsertReportedEvent(UnitOfWork* tx, const StoredEvent& event) {
-  const int kind = static_cast<int>(event.kind) + 1;
+  const int kind = static_cast<int>(event.kind);
   SELFCAL_ASSIGN_OR_RETURN(
       const std::int64_t inserted,
       InsertReturning(tx->db(),

@@ -32,7 +32,7 @@ absl::StatusOr<std::vector<StoredInstruction>> ReadAll(const std::string& rig,
         read->Text(4),
         fmt::format(
             "instruction {} for rig {}", instruction.instruction, rig)));
-    instruction.state = static_cast<InstructionState>(read->Int(5) - 1);
+    instruction.state = static_cast<InstructionState>(read->Int(5));
     instruction.message = read->Text(6);
     instruction.end_time_ns = read->Int(7);
   }
@@ -108,7 +108,7 @@ absl::Status EndInstruction(UnitOfWork* tx,
                    "WHERE rig = ?1 AND instruction = ?2 AND state = 1",
                    tx->rig_row(),
                    instruction,
-                   static_cast<int>(state) + 1,
+                   static_cast<int>(state),
                    message,
                    tx->time_ns())
       .Run();

@@ -8,7 +8,7 @@
 // The reports of a rig are numbered from 1. Number 1 begins anew: all records
 // follow. A report that was not acknowledged is made again with the records as
 // they are by then; its attempts are counted, over all numbers, so that the hub
-// does not take an earlier one after a later one.
+// ignores an attempt older than the newest it has accepted.
 #pragma once
 
 #include <absl/status/status.h>
@@ -64,7 +64,7 @@ class Outbox {
 
   // Rigs that are not reported yet.
   virtual absl::StatusOr<std::vector<std::string>> ListUnreported() = 0;
-  // Rigs that are, those that were deleted first.
+  // Reported rigs, deleted ones first.
   virtual absl::StatusOr<std::vector<ReportedRig>> List() = 0;
   // Puts all records of the rig into the outbox; the next report is number 1.
   virtual absl::Status BeginAnew(const std::string& rig, ReportedData data) = 0;

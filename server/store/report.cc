@@ -41,7 +41,7 @@ constexpr std::int64_t kMaxReportedBytes = std::int64_t{256} << 20;
 
 // The value of the column state.
 constexpr std::int64_t Number(CalibrationState state) {
-  return static_cast<std::int64_t>(state) + 1;
+  return static_cast<std::int64_t>(state);
 }
 constexpr std::int64_t kActive = Number(CalibrationState::kActive);
 constexpr std::int64_t kSuperseded = Number(CalibrationState::kSuperseded);
@@ -364,14 +364,13 @@ absl::Status ApplyEvent(UnitOfWork* tx,
   if (row == nullptr) return BadReport("an event is gone");
   SELFCAL_RETURN_IF_ERROR(
       About("an event", CheckReportedTime(row->Of("time_ns").integer())));
-  return InsertReportedEvent(
-      tx,
-      {record.number(),
-       row->Of("time_ns").integer(),
-       tx->rig(),
-       static_cast<EventKind>(row->Of("kind").integer() - 1),
-       row->Of("detail").text(),
-       row->Of("steady_ns").integer()});
+  return InsertReportedEvent(tx,
+                             {record.number(),
+                              row->Of("time_ns").integer(),
+                              tx->rig(),
+                              static_cast<EventKind>(row->Of("kind").integer()),
+                              row->Of("detail").text(),
+                              row->Of("steady_ns").integer()});
 }
 
 // Data that the device does not have any more stays. It is checked where it is
@@ -538,7 +537,8 @@ absl::Status WriteReportingDevice(UnitOfWork* tx,
 
 absl::StatusOr<std::int64_t> ReadEndOfReports(UnitOfWork* tx,
                                               std::int64_t key) {
-  // Writes, so that who tells of the deletion waits for this unit of work.
+  // Writes, so that a concurrent report of the deletion waits for this unit of
+  // work.
   return PutEndOfReports(tx->db(), key, 0, tx->time_ns());
 }
 

@@ -213,11 +213,11 @@ absl::Status ReadNewest(Connection* db, const Summaries& summaries) {
         summary->active_since_ns = row.Int(2);
         if (!row.IsNull(3)) {
           summary->newest_version = row.Int(3);
-          summary->newest_state = static_cast<CalibrationState>(row.Int(4) - 1);
+          summary->newest_state = static_cast<CalibrationState>(row.Int(4));
         }
         if (!row.IsNull(5)) {
           summary->newest_run = row.Int(5);
-          summary->run_state = static_cast<RunState>(row.Int(6) - 1);
+          summary->run_state = static_cast<RunState>(row.Int(6));
         }
         summary->newest_change_ns = row.Int(7);
         summary->unlike_cohort = row.Int(8);

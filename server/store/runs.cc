@@ -81,7 +81,7 @@ StoredRun RunFromRow(const Statement& row) {
   StoredRun run;
   run.rig = row.Text(0);
   run.run = row.Int(1);
-  run.state = static_cast<RunState>(row.Int(2) - 1);
+  run.state = static_cast<RunState>(row.Int(2));
   run.trigger = TriggerOf(row.Int(3), row.Int(11), row.Int(12) != 0);
   run.create_time_ns = row.Int(4);
   run.end_time_ns = row.Int(5);
@@ -319,7 +319,7 @@ absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run) {
                 "WHERE rig = ?1 AND run = ?2",
                 tx->rig_row(),
                 run.run,
-                static_cast<int>(run.state) + 1,
+                static_cast<int>(run.state),
                 run.attempts,
                 run.end_time_ns,
                 run.calibration_version,

@@ -9,8 +9,8 @@ namespace selfcal::server {
 
 // kUnusable: its data is damaged or cannot be scored, or it is quarantined
 // (server/domain/quarantine.h). Its problem says why; its information is not
-// used any more.
-enum class SegmentState { kStored, kScored, kUnusable };
+// used any more. The numbers are those on disk and never change.
+enum class SegmentState { kStored = 1, kScored = 2, kUnusable = 3 };
 
 // A closed interval; nullopt means no bound.
 template <typename T>

@@ -40,7 +40,7 @@ void AndScores(const SegmentQuery& query, SqlCondition* to) {
 void AndFilter(const SegmentQuery& query, SqlCondition* to) {
   if (query.state) {
     to->And("s.state = " +
-            to->Parameter(std::int64_t{static_cast<int>(*query.state) + 1}));
+            to->Parameter(std::int64_t{static_cast<int>(*query.state)}));
   }
   if (query.session) {
     to->And("s.session = " + to->Parameter(*query.session));
@@ -125,7 +125,7 @@ std::vector<std::string> OrderValues(const SegmentQuery& query,
 
 std::optional<int> StateNumber(const std::optional<SegmentState>& state) {
   if (!state) return std::nullopt;
-  return static_cast<int>(*state) + 1;
+  return static_cast<int>(*state);
 }
 
 template <typename T>

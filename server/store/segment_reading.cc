@@ -36,7 +36,7 @@ StoredSegment MetadataFromRow(const Statement& row) {
   segment.rig = row.Text(19);
   segment.key = {row.Text(0), row.Int(1)};
   segment.sequence = row.Int(2);
-  segment.state = static_cast<SegmentState>(row.Int(3) - 1);
+  segment.state = static_cast<SegmentState>(row.Int(3));
   segment.problem = row.Text(4);
   segment.receive_time_ns = row.Int(5);
   segment.calibration_version = row.Int(6);

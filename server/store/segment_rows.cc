@@ -20,7 +20,7 @@ constexpr int kNextColumn = 7;  // after these
 SegmentRow RowOf(const Statement& row) {
   SegmentRow segment{.key = {row.Text(0), row.Int(1)},
                      .sequence = row.Int(2),
-                     .state = static_cast<SegmentState>(row.Int(3) - 1),
+                     .state = static_cast<SegmentState>(row.Int(3)),
                      .receive_steady_ns = row.Int(4),
                      .fit = row.Double(5)};
   if (!row.IsNull(6)) segment.temperature_c = row.Double(6);

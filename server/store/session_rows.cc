@@ -148,7 +148,7 @@ absl::StatusOr<Listed<SessionSegment>> ListSessionSegmentRows(
   while (read.Next()) {
     SessionSegment segment;
     segment.key = {session, read.Int(1)};
-    segment.state = static_cast<SegmentState>(read.Int(2) - 1);
+    segment.state = static_cast<SegmentState>(read.Int(2));
     segment.start_ns = read.Int(3);
     segment.end_ns = read.Int(4);
     segment.path = PathFromRow(read, 5, 6, SegmentText(rig, segment.key));

@@ -103,13 +103,14 @@ struct StoredSegment {
   std::string problem;
 };
 
-// The transitions between them are in server/domain/calibration_life.h.
+// The numbers are those on disk and never change. The transitions between the
+// states are in server/domain/calibration_life.h.
 enum class CalibrationState {
-  kActive,
-  kSuperseded,
-  kRejected,
-  kCandidate,
-  kRolledBack,
+  kActive = 1,
+  kSuperseded = 2,
+  kRejected = 3,
+  kCandidate = 4,
+  kRolledBack = 5,
 };
 
 // A check that could not be made is never treated as passed.
@@ -218,7 +219,15 @@ struct StoredEstimate {
   std::optional<double> from_factory;  // nullopt: of other cameras
 };
 
-enum class RunState { kPending, kRunning, kSucceeded, kFailed, kCancelled };
+// The numbers are those on disk and never change.
+enum class RunState {
+  kPending = 1,
+  kRunning = 2,
+  kSucceeded = 3,
+  kFailed = 4,
+  kCancelled = 5,
+};
+
 enum class RunTrigger {
   kTablesFull,
   kTablesChanged,
@@ -263,7 +272,8 @@ struct StoredChange {
   double inflation = 1;             // factor on the variances of segments
 };
 
-enum class InstructionState { kPending, kDone, kRefused };
+// The numbers are those on disk and never change.
+enum class InstructionState { kPending = 1, kDone = 2, kRefused = 3 };
 
 // What a hub has the device of a rig do.
 struct StoredInstruction {
@@ -476,7 +486,7 @@ class Store {
   virtual absl::StatusOr<Listed<StoredInstruction>> ListInstructions(
       const std::string& rig, const Page& page) = 0;
 
-  // --- Cohorts. Their statistics are of no one rig.
+  // --- Cohorts. Their statistics belong to no single rig.
   // Every version of a cohort, newest first, or the newest of each if the label
   // is empty.
   virtual absl::StatusOr<Listed<StoredCohort>> ListCohorts(
@@ -516,9 +526,10 @@ class Store {
   virtual absl::Status AppendEvent(const StoredEvent& event) = 0;
 
   // --- Reports of devices (report.h).
-  // The device has deleted the rig with this key in its database, as it told in
-  // this attempt: a first report of the rig by an earlier attempt comes late
-  // (ReadEndOfReports). Those that are being taken meanwhile are waited for.
+  // The device has deleted the rig with this key in its database, as reported
+  // in this attempt; the first report of the rig by an older attempt that
+  // arrives later is ignored (ReadEndOfReports). Waits for those that are being
+  // taken.
   virtual absl::Status EndReports(std::int64_t key,
                                   std::int64_t attempt,
                                   std::int64_t now_ns) = 0;

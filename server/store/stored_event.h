@@ -6,27 +6,27 @@
 
 namespace selfcal::server {
 
-// Their positions, counted from 1, are stored in the database: only ever
-// extended.
+// The numbers are those on disk and in the contract (Event.Kind of
+// store_service.proto) and never change.
 enum class EventKind {
-  kRigCreated,
-  kRunStarted,
-  kRunEnded,
-  kCalibrationPublished,
-  kCalibrationRejected,
-  kSegmentUnusable,
-  kChangeDetected,
-  kDataEvicted,            // a quota was reached
-  kCalibrationActivated,   // manually
-  kCalibrationRolledBack,  // manually
-  kRunDeferred,
-  kSegmentQuarantined,  // by a run, by its neighbours, or manually
-  kCoresDisagree,       // a verification found a difference
-  kRigUpdated,          // by hand, as the next two
-  kRigDeleted,
-  kSegmentDeleted,
-  kTlsFilesRefused,  // of the daemon, without a rig
-  kClockStepped,     // likewise
+  kRigCreated = 1,
+  kRunStarted = 2,
+  kRunEnded = 3,
+  kCalibrationPublished = 4,
+  kCalibrationRejected = 5,
+  kSegmentUnusable = 6,
+  kChangeDetected = 7,
+  kDataEvicted = 8,             // a quota was reached
+  kCalibrationActivated = 9,    // manually
+  kCalibrationRolledBack = 10,  // manually
+  kRunDeferred = 11,
+  kSegmentQuarantined = 12,  // by a run, by its neighbours, or manually
+  kCoresDisagree = 13,       // a verification found a difference
+  kRigUpdated = 14,          // by hand, as the next two
+  kRigDeleted = 15,
+  kSegmentDeleted = 16,
+  kTlsFilesRefused = 17,  // of the daemon, without a rig
+  kClockStepped = 18,     // likewise
 };
 
 struct StoredEvent {

@@ -21,8 +21,10 @@ class AlarmsTest : public StoreTest {
     Score(rig, 0, 1.0);
   }
 
-  // A run with this end.
-  void Run(const std::string& id, RunState end, CalibrationState state) {
+  // A run with this end; if it succeeds, its version gets this state.
+  void Run(const std::string& id,
+           RunState end,
+           CalibrationState state = CalibrationState::kRejected) {
     const auto run = domain_->CreateManualRun(id, true);
     ASSERT_TRUE(run.ok()) << run.status();
     ASSERT_TRUE(domain_->BeginRun(id, run->run).ok());
@@ -71,13 +73,13 @@ SELFCAL_STORE_TEST_SUITE(AlarmsTest);
 TEST_P(AlarmsTest, TheMostUrgentComeFirstAndOthersAreNotListed) {
   for (const char* id : {"failed", "fine", "rejected"}) FillRig(id);
   EXPECT_THAT(WithAlarms(), IsEmpty());
-  Run("failed", RunState::kFailed, {});
+  Run("failed", RunState::kFailed);
   Run("rejected", RunState::kSucceeded, CalibrationState::kRejected);
   Run("fine", RunState::kSucceeded, CalibrationState::kActive);
   EXPECT_THAT(WithAlarms(), ElementsAre("rejected", "failed"));
   Run("rejected", RunState::kSucceeded, CalibrationState::kActive);
   EXPECT_THAT(WithAlarms(), ElementsAre("failed"));
-  Run("failed", RunState::kCancelled, {});
+  Run("failed", RunState::kCancelled);
   EXPECT_THAT(WithAlarms(), IsEmpty());
 }
 

@@ -68,6 +68,9 @@ inline void ExpectFixture(Store* store) {
   ASSERT_EQ(segments->items.size(), 4u);
   for (const StoredSegment& segment : segments->items) {
     EXPECT_EQ(segment.information.has_value(), segment.key.index < 3);
+    EXPECT_EQ(
+        segment.state,
+        segment.key.index < 3 ? SegmentState::kScored : SegmentState::kStored);
     EXPECT_EQ(segment.sequence, segment.key.index + 1);
     EXPECT_TRUE(segment.problem.empty()) << segment.problem;
     if (!segment.has_data) continue;
@@ -91,12 +94,14 @@ inline void ExpectFixture(Store* store) {
   const auto active = store->GetActiveCalibration("a");
   ASSERT_TRUE(active.ok()) << active.status();
   EXPECT_EQ(active->version, 2);
+  EXPECT_EQ(active->state, CalibrationState::kActive);
   EXPECT_EQ(active->theta.cameras[0].f.x(),
             FixtureRig().factory.cameras[0].f.x() + 1);
   EXPECT_EQ(active->program_version, "fixture");
   EXPECT_EQ(active->segments.size(), 2u);
   const auto factory = store->GetCalibration("a", 1);
   ASSERT_TRUE(factory.ok()) << factory.status();
+  EXPECT_EQ(factory->state, CalibrationState::kSuperseded);
   EXPECT_EQ(factory->theta.cameras[0].f, FixtureRig().factory.cameras[0].f);
   const auto runs = store->ListRuns("a", {});
   ASSERT_TRUE(runs.ok()) << runs.status();
@@ -104,7 +109,8 @@ inline void ExpectFixture(Store* store) {
   EXPECT_EQ(runs->items.back().state, RunState::kSucceeded);
   const auto events = store->ListEvents({});
   ASSERT_TRUE(events.ok()) << events.status();
-  EXPECT_GE(events->items.size(), 4u);
+  ASSERT_GE(events->items.size(), 4u);
+  EXPECT_EQ(events->items.front().kind, EventKind::kRigCreated);
 }
 
 }  // namespace selfcal::server

@@ -138,7 +138,10 @@ class SegmentQueryTest : public StoreTest {
       return drawn;
     };
     SegmentQuery query;
-    if (pick(3) == 0) query.state = static_cast<SegmentState>(pick(2));
+    if (pick(3) == 0) {
+      query.state =
+          pick(2) == 0 ? SegmentState::kStored : SegmentState::kScored;
+    }
     if (pick(4) == 0) query.session = pick(2) == 0 ? "s" : "t";
     if (pick(4) == 0) query.has_data = pick(2) == 0;
     if (pick(4) == 0) query.in_table = groups_[pick(2)];

@@ -81,7 +81,7 @@ TEST_F(PostgresSchemaTest, RecordsThatNeverChangeCannotBeChangedOrDeleted) {
 TEST_F(PostgresSchemaTest, EveryTransitionThatIsNotInTheTableIsRefused) {
   const auto set = [](CalibrationState state) {
     return "UPDATE calibrations SET state = " +
-           std::to_string(static_cast<int>(state) + 1) + " WHERE version = 2";
+           std::to_string(static_cast<int>(state)) + " WHERE version = 2";
   };
   ASSERT_TRUE(db_->Execute("DROP INDEX one_active_calibration").ok());
   int allowed = 0;
@@ -103,7 +103,7 @@ TEST_F(PostgresSchemaTest, OnlyCandidatesAndTheFactorysBegin) {
   for (const CalibrationState state : kStates) {
     const std::string sql =
         "INSERT INTO calibrations SELECT rig, 9, " +
-        std::to_string(static_cast<int>(state) + 1) +
+        std::to_string(static_cast<int>(state)) +
         ", create_time_ns, run, content, sha256, create_steady_ns "
         "FROM calibrations WHERE version = 1";
     EXPECT_EQ(db_->Execute("BEGIN;" + sql).ok(),

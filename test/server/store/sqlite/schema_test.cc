@@ -23,6 +23,56 @@ constexpr CalibrationState kStates[] = {CalibrationState::kActive,
                                         CalibrationState::kCandidate,
                                         CalibrationState::kRolledBack};
 
+template <typename Enum>
+void ExpectNumbers(const std::vector<std::pair<Enum, int>>& expected) {
+  for (const auto& [enumerator, number] : expected) {
+    EXPECT_EQ(static_cast<int>(enumerator), number);
+  }
+}
+
+// Databases that exist hold these numbers.
+TEST(NumbersOnDisk, OfStatesNeverChange) {
+  ExpectNumbers<SegmentState>({{SegmentState::kStored, 1},
+                               {SegmentState::kScored, 2},
+                               {SegmentState::kUnusable, 3}});
+  ExpectNumbers<CalibrationState>({{CalibrationState::kActive, 1},
+                                   {CalibrationState::kSuperseded, 2},
+                                   {CalibrationState::kRejected, 3},
+                                   {CalibrationState::kCandidate, 4},
+                                   {CalibrationState::kRolledBack, 5}});
+  ExpectNumbers<RunState>({{RunState::kPending, 1},
+                           {RunState::kRunning, 2},
+                           {RunState::kSucceeded, 3},
+                           {RunState::kFailed, 4},
+                           {RunState::kCancelled, 5}});
+  ExpectNumbers<InstructionState>({{InstructionState::kPending, 1},
+                                   {InstructionState::kDone, 2},
+                                   {InstructionState::kRefused, 3}});
+}
+
+TEST(NumbersOnDisk, OfKindsNeverChange) {
+  ExpectNumbers<ChangeKind>(
+      {{ChangeKind::kSudden, 1}, {ChangeKind::kDrift, 2}});
+  ExpectNumbers<EventKind>({{EventKind::kRigCreated, 1},
+                            {EventKind::kRunStarted, 2},
+                            {EventKind::kRunEnded, 3},
+                            {EventKind::kCalibrationPublished, 4},
+                            {EventKind::kCalibrationRejected, 5},
+                            {EventKind::kSegmentUnusable, 6},
+                            {EventKind::kChangeDetected, 7},
+                            {EventKind::kDataEvicted, 8},
+                            {EventKind::kCalibrationActivated, 9},
+                            {EventKind::kCalibrationRolledBack, 10},
+                            {EventKind::kRunDeferred, 11},
+                            {EventKind::kSegmentQuarantined, 12},
+                            {EventKind::kCoresDisagree, 13},
+                            {EventKind::kRigUpdated, 14},
+                            {EventKind::kRigDeleted, 15},
+                            {EventKind::kSegmentDeleted, 16},
+                            {EventKind::kTlsFilesRefused, 17},
+                            {EventKind::kClockStepped, 18}});
+}
+
 class SchemaTest : public SqliteTest {
  protected:
   void SetUp() override { ASSERT_TRUE(Open().ok()); }
@@ -136,7 +186,7 @@ TEST_F(SchemaTest, DatabaseRefusesEveryTransitionThatIsNotInTheTable) {
   ASSERT_TRUE(trigger.ok()) << trigger.status();
   const auto set = [](CalibrationState state) {
     return "UPDATE calibrations SET state = " +
-           std::to_string(static_cast<int>(state) + 1) + " WHERE version = 2;";
+           std::to_string(static_cast<int>(state)) + " WHERE version = 2;";
   };
   int allowed = 0;
   for (const CalibrationState from : kStates) {
@@ -158,7 +208,7 @@ TEST_F(SchemaTest, DatabaseLetsOnlyCandidatesAndTheFactorysBegin) {
   for (const CalibrationState state : kStates) {
     const std::string sql =
         "INSERT INTO calibrations SELECT rig, 9, " +
-        std::to_string(static_cast<int>(state) + 1) +
+        std::to_string(static_cast<int>(state)) +
         ", create_time_ns, run, content, sha256, create_steady_ns "
         "FROM calibrations";
     EXPECT_EQ(Execute("BEGIN;" + sql + ";ROLLBACK").ok(),
