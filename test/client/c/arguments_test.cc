@@ -10,6 +10,7 @@
 
 #include "client/c/selfcal.h"
 #include "test/client/c/session.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::testing_c {
 namespace {
@@ -300,9 +301,11 @@ TEST_F(ArgumentsTest, ALongMessageIsCutBetweenCharacters) {
   selfcal_watch* watch = nullptr;
   ASSERT_EQ(selfcal_watch_create(&device, nullptr, nullptr, &watch, nullptr),
             SELFCAL_OK);
-  while (selfcal_watch_connection_status(watch, &error_) == SELFCAL_OK) {
-  }
+  const bool has_failed = Eventually([&] {
+    return selfcal_watch_connection_status(watch, &error_) != SELFCAL_OK;
+  });
   selfcal_watch_destroy(watch);
+  ASSERT_TRUE(has_failed);
   const std::string message = error_.message;
   EXPECT_EQ(error_.code, SELFCAL_FAILED_PRECONDITION);
   EXPECT_GE(message.size(), sizeof(error_.message) - 2);

@@ -55,13 +55,13 @@ class RigWatchesTest : public ::testing::Test {
 TEST_F(RigWatchesTest, ThoseOfARigThatIsGoneEnd) {
   const Watch a = Add("a");
   const Watch b = Add("b");
-  watches_->EnderOfGone()("a");
-  watches_->EnderOfGone()("");
+  watches_->DeletionHandler()("a");
+  watches_->DeletionHandler()("");
   EXPECT_FALSE(a.HasEnded());
   Delete("a");
-  watches_->EnderOfGone()("b");
+  watches_->DeletionHandler()("b");
   EXPECT_FALSE(a.HasEnded());
-  watches_->EnderOfGone()("a");
+  watches_->DeletionHandler()("a");
   EXPECT_TRUE(a.HasEnded());
   EXPECT_FALSE(b.HasEnded());
 }
@@ -72,7 +72,7 @@ TEST_F(RigWatchesTest, ThoseOfANewRigOfTheNameGoOn) {
   Create("a");
   const Watch new_one = Add("a");
   const Watch b = Add("b");
-  watches_->EnderOfGone()("");  // as if the announcement were lost
+  watches_->DeletionHandler()("");  // as if the announcement were lost
   EXPECT_TRUE(old_one.HasEnded());
   EXPECT_FALSE(new_one.HasEnded());
   EXPECT_FALSE(b.HasEnded());
@@ -83,17 +83,17 @@ TEST_F(RigWatchesTest, ManyRigsAreLookedFor) {
   for (int k = 0; k < 2500; ++k)
     watches.push_back(Add("r" + std::to_string(k)));
   for (int k = 0; k < 2500; k += 500) Create("r" + std::to_string(k));
-  watches_->EnderOfGone()("");
+  watches_->DeletionHandler()("");
   for (int k = 0; k < 2500; ++k) EXPECT_EQ(watches[k].HasEnded(), k % 500 == 0);
 }
 
 TEST_F(RigWatchesTest, OneThatIsReleasedIsForgotten) {
   Watch a = Add("a");
-  const auto ender = watches_->EnderOfGone();
+  const auto handler = watches_->DeletionHandler();
   a.registered.reset();
   watches_.reset();
   Delete("a");
-  ender("");
+  handler("");
   EXPECT_FALSE(a.HasEnded());
 }
 

@@ -13,7 +13,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ApiTest = ConsoleTest;
 
-// As gRPC has it.
+// The message that the reply holds as JSON.
 template <typename Message>
 Message Parsed(const Reply& reply) {
   Message message;
@@ -132,7 +132,7 @@ TEST_F(ApiTest, TwoVersionsAreCompared) {
   EXPECT_EQ(Get("/api/v1/rigs/r/calibrations/1:compare").status, 400);
 }
 
-TEST_F(ApiTest, TheCoachSaysWhatItSaysOverGrpc) {
+TEST_F(ApiTest, TheCoachSaysWhatThePipelineSays) {
   AddRig("r");
   const auto expected = pipeline_->AdviseMotion("r");
   ASSERT_TRUE(expected.ok()) << expected.status();

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "test/support/eventually.h"
@@ -22,11 +23,16 @@ class BacklogTest : public ::testing::Test {
   bool Take(const std::string& rig) {
     return backlog_.Take(rig, [] { return false; }).ok();
   }
-  // Takes a place on a thread, which notes the rig when it has it.
+  // Takes a place on a thread, which notes the rig when it has it. The first
+  // question whether the caller has gone comes once it is in the queue.
   void TakeLater(const std::string& rig) {
     threads_.emplace_back([this, rig] {
-      ++begun_;
-      if (!Take(rig)) return;
+      bool waits = false;
+      const auto counted = [&] {
+        if (!std::exchange(waits, true)) ++waiting_;
+        return false;
+      };
+      if (!backlog_.Take(rig, counted).ok()) return;
       const std::lock_guard lock(mutex_);
       order_.push_back(rig);
     });
@@ -37,7 +43,7 @@ class BacklogTest : public ::testing::Test {
   }
 
   Backlog backlog_{3};
-  std::atomic<int> begun_{0};
+  std::atomic<int> waiting_{0};
   std::mutex mutex_;
   std::vector<std::string> order_;
   std::vector<std::thread> threads_;
@@ -54,7 +60,7 @@ TEST_F(BacklogTest, IsClosedBeforeOpenAndAfterClose) {
 TEST_F(BacklogTest, ARigWithoutAPlaceDoesNotWaitForOthers) {
   backlog_.Open({{"busy", 3}});
   TakeLater("busy");
-  ASSERT_TRUE(Eventually([&] { return begun_ == 1; }));
+  ASSERT_TRUE(Eventually([&] { return waiting_ == 1; }));
   EXPECT_TRUE(Take("quiet"));
   EXPECT_TRUE(Order().empty());
   // Its second place is one of those that all share.
@@ -66,12 +72,11 @@ TEST_F(BacklogTest, ARigWithoutAPlaceDoesNotWaitForOthers) {
 TEST_F(BacklogTest, TheRigWithTheFewestPlacesIsNext) {
   backlog_.Open({{"busy", 3}, {"quiet", 1}});
   TakeLater("busy");
-  ASSERT_TRUE(Eventually([&] { return begun_ == 1; }));
+  ASSERT_TRUE(Eventually([&] { return waiting_ == 1; }));
   TakeLater("busy");
   TakeLater("quiet");
-  ASSERT_TRUE(Eventually([&] { return begun_ == 3; }));
-  // Both are in the queue before there is room.
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  // All are in the queue before there is room.
+  ASSERT_TRUE(Eventually([&] { return waiting_ == 3; }));
   EXPECT_TRUE(Order().empty());
   backlog_.Return("busy");
   backlog_.Return("busy");

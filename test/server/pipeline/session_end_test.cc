@@ -9,7 +9,13 @@ namespace {
 
 class SessionEndTest : public PipelineTest {
  protected:
-  SessionEndTest() { options_.recheck = std::chrono::milliseconds(5); }
+  SessionEndTest() {
+    options_.recheck = std::chrono::milliseconds(5);
+    options_.now_ns = [this] {
+      ++looks_;
+      return NowNs();
+    };
+  }
   ~SessionEndTest() override {
     blocked_ = false;
     pipeline_.reset();
@@ -17,7 +23,10 @@ class SessionEndTest : public PipelineTest {
 
   // Nothing is idle for the pipeline: sessions end by hand alone.
   void StopTheClock() {
-    options_.now_ns = [] { return std::int64_t{0}; };
+    options_.now_ns = [this] {
+      ++looks_;
+      return std::int64_t{0};
+    };
   }
 
   // A run on four segments, and a fifth that changes a quarter of the tables.
@@ -42,25 +51,31 @@ class SessionEndTest : public PipelineTest {
         };
   }
 
-  void ExpectNoSecondRun() {
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
-    EXPECT_TRUE(absl::IsNotFound(store_->GetRun("a", 2).status()));
+  // The pipeline has looked whether a run is due, after each session end that
+  // was announced became due, and has created none.
+  void ExpectNoRun(std::int64_t run) {
+    std::this_thread::sleep_for(options_.session_idle);
+    const int before = looks_;
+    EXPECT_TRUE(Eventually([&] { return looks_ >= before + 3; }));
+    EXPECT_TRUE(absl::IsNotFound(store_->GetRun("a", run).status()));
   }
 
   std::atomic<bool> blocked_ = false;
+  // The pipeline asks for the time at the beginning of each look, of which it
+  // makes one at a time.
+  std::atomic<int> looks_ = 0;
 };
 
 TEST_F(SessionEndTest, AnEndedSessionWithChangedTablesStartsARun) {
   StopTheClock();
   options_.session_idle = std::chrono::milliseconds(20);
   ChangeTables();
-  ExpectNoSecondRun();
+  ExpectNoRun(2);
   pipeline_->EndSession("a");
   ASSERT_TRUE(RunIs(RunState::kSucceeded, 2));
   EXPECT_EQ(store_->GetRun("a", 2)->trigger, RunTrigger::kSessionEnded);
   pipeline_->EndSession("a");
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  EXPECT_TRUE(absl::IsNotFound(store_->GetRun("a", 3).status()));
+  ExpectNoRun(3);
 }
 
 TEST_F(SessionEndTest, ARigThatSendsNoMoreHasEndedItsSession) {
@@ -73,7 +88,7 @@ TEST_F(SessionEndTest, ARigThatSendsNoMoreHasEndedItsSession) {
 TEST_F(SessionEndTest, AnIdleSessionEndsAfterARestartToo) {
   options_.session_idle = std::chrono::milliseconds(0);
   ChangeTables();
-  ExpectNoSecondRun();
+  ExpectNoRun(2);
   options_.session_idle = std::chrono::milliseconds(1);
   Restart();
   ASSERT_TRUE(RunIs(RunState::kSucceeded, 2));
@@ -100,7 +115,7 @@ TEST_F(SessionEndTest, ASessionThatGoesOnHasNotEnded) {
   pipeline_->EndSession("a");
   ASSERT_GT(EntropyOf(5), EntropyOf(6));
   Submit(5);  // the client is back
-  ExpectNoSecondRun();
+  ExpectNoRun(2);
 }
 
 TEST_F(SessionEndTest, TheRunWaitsForScores) {
@@ -112,7 +127,7 @@ TEST_F(SessionEndTest, TheRunWaitsForScores) {
   ASSERT_LT(EntropyOf(9), EntropyOf(6) + 10);
   Submit(9);
   pipeline_->EndSession("a");
-  ExpectNoSecondRun();
+  ExpectNoRun(2);
   blocked_ = false;
   ASSERT_TRUE(RunIs(RunState::kSucceeded, 2));
 }

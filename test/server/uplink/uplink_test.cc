@@ -57,11 +57,26 @@ TEST_F(UplinkTest, WhatChangedBeforeAStartIsReported) {
 
 TEST_F(UplinkTest, StopsAtOnceWhileItIsLimited) {
   CreateDeviceRig();
-  Begin({.max_bytes_per_s = 1});
+  FakeHub* const way = Begin({.max_bytes_per_s = 1});
   EXPECT_TRUE(Eventually([&] { return hub_.store->GetRig("a").ok(); }));
   Put(0);
-  std::this_thread::sleep_for(std::chrono::milliseconds(700));
+  // The outbox counts the attempts to report, with those of this test: the
+  // second one of the uplink has to wait.
+  Outbox* const outbox = device_.store->outbox();
+  int own = 0;
+  EXPECT_TRUE(Eventually(
+      [&] {
+        const auto report = outbox->Next(outbox->List()->front(), 1 << 20);
+        ++own;
+        return report.ok() && report->attempt - own == 2;
+      },
+      kLongWait,
+      kDaemonInterval));
+  const auto begun = std::chrono::steady_clock::now();
   uplink_->Stop();  // would wait for an hour
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, kLongWait);
+  EXPECT_EQ(way->calls, 1);
+  EXPECT_EQ(SegmentsAtHub(), 0u);
 }
 
 TEST_F(UplinkTest, LimitHoldsWhileTheHubIsAway) {
