@@ -50,9 +50,10 @@ void AddAttention(CLI::App* rig, Context* context) {
   CLI::App* attention = rig->add_subcommand(
       "attention", "List the rigs that have alarms, the most urgent first");
   const auto options = std::make_shared<ListOptions>();
-  attention->add_option("--filter",
-                        options->filter,
-                        "Of which rigs, e.g. 'labels.batch = \"2026-10\"'");
+  attention->add_option(
+      "--filter",
+      options->filter,
+      "Only rigs that match, e.g. 'labels.batch = \"2026-10\"'");
   attention->add_option("--limit", options->limit, "Only the first; 0: all");
   AddCsv(attention, context);
   attention->callback([context, options] {

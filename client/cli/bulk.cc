@@ -38,10 +38,10 @@ bool IsMade(const Context& context,
 }  // namespace
 
 CLI::Option* AddBulkOptions(CLI::App* command, BulkOptions* options) {
-  CLI::Option* const filter =
-      command->add_option("--filter",
-                          options->filter,
-                          "All rigs of it, e.g. 'labels.batch = \"2026-10\"'");
+  CLI::Option* const filter = command->add_option(
+      "--filter",
+      options->filter,
+      "All rigs that match, e.g. 'labels.batch = \"2026-10\"'");
   command
       ->add_flag(
           "--dry-run", options->dry_run, "Only show what would be changed")

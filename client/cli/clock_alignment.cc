@@ -30,8 +30,9 @@ absl::Status AlignClocks(const Calibration& theta,
   if (*shift_ns == 0) return absl::OkStatus();
   session->recording->ShiftReadings(*shift_ns);
   PrintError(fmt::format(
-      "{}: the clock of the readings is {:.3f} s {} that of the images: their "
-      "stamps are taken {} by that, and time offsets are in addition to it. "
+      "{}: the clock of the readings is {:.3f} s {} that of the images: the "
+      "timestamps of the readings are shifted {} by this amount, and time "
+      "offsets are in addition to it. "
       "Where clocks begin with each recording, so do time offsets: calibrate "
       "such recordings one by one",
       session->name,

@@ -245,7 +245,7 @@ void AddVersionCommands(CLI::App* cohorts, Context* context) {
   prior
       ->add_option("--version",
                    options->version,
-                   "Of the statistics, as in the list [newest]")
+                   "Version of the statistics, as in the list [newest]")
       ->check(CLI::Range(std::int64_t{1}, INT64_MAX));
   prior->callback([context, options] {
     context->command = [context, options] {
@@ -269,11 +269,11 @@ void AddCohortCommands(CLI::App* app, Context* context) {
   show->add_option_function<std::string>(
       "--filter",
       [request](const std::string& filter) { request->set_filter(filter); },
-      "Which rigs, e.g. 'labels.model = \"t4\"'; all by default");
+      "Only rigs that match, e.g. 'labels.model = \"t4\"'; all by default");
   show->add_option_function<int>(
           "--max-rigs",
           [request](int rigs) { request->set_max_rigs(rigs); },
-          "Look at so many of them, the last seen first; 500 by default")
+          "Maximum number of rigs, most recently seen first; 500 by default")
       ->check(CLI::Range(1, 2000));
   AddCsv(show, context);
   show->callback([context, request] {

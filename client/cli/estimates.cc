@@ -89,7 +89,7 @@ void AddEstimateCommands(CLI::App* app, Context* context) {
       "--active", options->only_active, "Only of the active versions");
   list->add_option("--filter",
                    options->list.filter,
-                   "Which rigs, e.g. 'labels.batch = \"2026-10\"'");
+                   "Only rigs that match, e.g. 'labels.batch = \"2026-10\"'");
   list->add_option("--limit", options->list.limit, "Only the first; 0: all");
   AddCsv(list, context);
   list->callback([context, options] {

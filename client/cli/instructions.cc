@@ -140,8 +140,8 @@ std::optional<int> EndFailed(const grpc::Status& status,
 }
 
 void AddInstructionCommands(CLI::App* app, Context* context) {
-  CLI::App* instruction =
-      app->add_subcommand("instruction", "Show what this hub has devices do");
+  CLI::App* instruction = app->add_subcommand(
+      "instruction", "Show the instructions of this hub for devices");
   instruction->require_subcommand(1);
   CLI::App* list = instruction->add_subcommand(
       "list", "List the instructions for the device of a rig, newest first");

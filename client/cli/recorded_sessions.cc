@@ -121,8 +121,7 @@ void AddRecordingsOptions(CLI::App* command, RecordingsInput* input) {
   command
       ->add_option("--keyframe-rate",
                    input->keyframe_rate_hz,
-                   "Keyframes are at most so many in a second, but for those "
-                   "of a map [Hz]")
+                   "Maximum keyframe rate; maps keep theirs [Hz]")
       ->check(AboveZero())
       ->capture_default_str();
   AddTemperature(command,

@@ -1,5 +1,5 @@
-// segments information, segments residuals: what one segment tells about each
-// component, and what it leaves unexplained.
+// segments information, segments residuals: the information of one segment
+// about each component, and what it leaves unexplained.
 #include <fmt/format.h>
 
 #include <memory>

@@ -110,7 +110,7 @@ void AddSessionCommands(CLI::App* app, Context* context) {
   const auto rig = std::make_shared<std::string>();
   const auto session = std::make_shared<std::string>();
   CLI::App* list = sessions->add_subcommand(
-      "list", "List the sessions of a rig of which segments are stored");
+      "list", "List the sessions of a rig that have stored segments");
   list->add_option("RIG", *rig)->required();
   const auto options = std::make_shared<ListOptions>();
   AddListOptions(list,

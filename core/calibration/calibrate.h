@@ -119,8 +119,7 @@ struct CalibrationResult {
   int segments = 0;
   int partitions = 0;
   int keyframes = 0;
-  int landmarks =
-      0;  // variables; those of split landmarks are counted separately
+  int landmarks = 0;  // variables; those of split landmarks count separately
   int landmarks_dropped = 0;
   int observations = 0;  // used
   int observations_dropped = 0;

@@ -11,7 +11,7 @@ Api::Api(Domain* domain,
          EventFeed* feed,
          ApiOptions options)
     : watches_(domain->store()), versions_(domain->store()) {
-  pipeline->ListenForDeletions(watches_.EnderOfGone());
+  pipeline->ListenForDeletions(watches_.DeletionHandler());
   Methods methods({domain,
                    domain->store(),
                    pipeline,

@@ -49,9 +49,9 @@ void RigWatches::End(const std::string& rig) {
   }
 }
 
-std::function<void(const std::string&)> RigWatches::EnderOfGone() const {
+std::function<void(const std::string&)> RigWatches::DeletionHandler() const {
   return [store = store_, registered = registered_](const std::string& rig) {
-    EndGone(store, registered.get(), rig);
+    EndWatchesOfDeletedRig(store, registered.get(), rig);
   };
 }
 
@@ -63,9 +63,9 @@ RigWatches::Watches RigWatches::Copy(Registered* registered,
   return {begin, end};
 }
 
-void RigWatches::EndGone(Store* store,
-                         Registered* registered,
-                         const std::string& rig) {
+void RigWatches::EndWatchesOfDeletedRig(Store* store,
+                                        Registered* registered,
+                                        const std::string& rig) {
   // Before the keys are read: a rig that is created in between has no watch
   // here.
   const Watches watches = Copy(registered, rig);

@@ -35,7 +35,7 @@ class RigWatches {
   // A function that does so with the watches of a rig, or of all rigs if the
   // name is empty, as far as the rig is gone or another one has its name. Does
   // nothing if the store fails. It may outlive this object.
-  std::function<void(const std::string& rig)> EnderOfGone() const;
+  std::function<void(const std::string& rig)> DeletionHandler() const;
 
  private:
   struct Watch {
@@ -50,9 +50,9 @@ class RigWatches {
 
   // Those of a rig or, if the name is empty, of all.
   static Watches Copy(Registered* registered, const std::string& rig);
-  static void EndGone(Store* store,
-                      Registered* registered,
-                      const std::string& rig);
+  static void EndWatchesOfDeletedRig(Store* store,
+                                     Registered* registered,
+                                     const std::string& rig);
 
   Store* const store_;
   const std::shared_ptr<Registered> registered_ =

@@ -134,7 +134,7 @@ void DefineLimits(Definer* define, DaemonOptions* options) {
   define
       ->Add("max-memory-bytes",
             &server.max_memory_bytes,
-            "Limit on the bytes of messages in flight and of what they become")
+            "Limit on the bytes of messages in flight and of their parsed form")
       ->check(CLI::Range(kMinMemoryBytes, kMaxMemoryBytes))
       ->capture_default_str();
   define
@@ -338,7 +338,7 @@ void DefineUplink(Definer* define, DaemonOptions* options) {
   define
       ->Add("uplink-max-bytes",
             &options->domain.quotas.max_unreported_bytes_per_rig,
-            "Limit on the bytes of data of a rig that stays only until it was "
+            "Limit on the bytes of data of a rig that is kept only until it is "
             "reported (uplink-data all); beyond it, the oldest is not "
             "reported; 0: no limit")
       ->check(CLI::Range(std::int64_t{0}, kMaxBytes))

@@ -455,8 +455,8 @@ absl::StatusOr<ReportAnswer> Domain::TakeReport(const DeviceReport& report) {
   const bool is_first = report.number == 1;
   ReportAnswer begin_anew;
   begin_anew.begin_anew = true;
-  // Its records do not fit, unless it is of another device, of which the first
-  // report is told.
+  // Its records do not fit, unless it is of another device, in which case only
+  // the first report returns the error.
   if (absl::IsFailedPrecondition(taken.status()) && !is_first) {
     return begin_anew;
   }

@@ -27,8 +27,8 @@ struct Quotas {
   // it if that is less. New segments are refused where they would not.
   std::int64_t min_free_bytes = std::int64_t{256} << 20;
   std::int64_t max_rigs = 10'000;
-  // Compressed data of one rig's segments that stays only until it was reported
-  // to the hub. Beyond it, the oldest is not reported.
+  // Compressed data of one rig's segments that is kept only until it is
+  // reported to the hub. Beyond it, the oldest is not reported.
   std::int64_t max_unreported_bytes_per_rig = std::int64_t{1} << 30;
 
   friend bool operator==(const Quotas&, const Quotas&) = default;

@@ -39,8 +39,8 @@ struct ReportAnswer {
   // The hub does not have what was reported before, e.g. since it was restored
   // from a backup: the device must report all records anew.
   bool begin_anew = false;
-  // Nothing was taken, since this attempt was before, which is a later one; 0:
-  // there is none.
+  // The report was rejected because this later attempt was accepted before; 0:
+  // accepted.
   std::int64_t attempt = 0;
   std::vector<StoredInstruction> instructions;  // pending ones, oldest first
 };

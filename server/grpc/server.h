@@ -44,7 +44,7 @@ struct ServerOptions {
   int max_threads = 128;
   int max_watches = 10'000;
   int max_segment_streams = 256;
-  // For messages in flight and for what they become.
+  // For messages in flight and for their parsed form.
   std::int64_t max_memory_bytes = 512 << 20;
   // A caller that does not read a response of a stream for so long is cut off.
   std::chrono::milliseconds max_write_time{60'000};

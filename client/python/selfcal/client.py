@@ -238,7 +238,7 @@ class Daemon:
     def segment_information(
         self, rig_id: str, segment_id: str
     ) -> segment.SegmentInformation:
-        """What a segment alone tells about each component."""
+        """The information of a segment alone about each component."""
         return self.segment_service.GetSegmentInformation(
             segment.GetSegmentInformationRequest(
                 name=f"rigs/{rig_id}/segments/{segment_id}"
