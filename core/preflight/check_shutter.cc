@@ -1,7 +1,8 @@
 // Compares the rows of images with each other: if they were exposed one after
 // the other, the residuals of a point that moves in the image grow with its
 // row. The states may follow any row, since a common delay is fitted as well,
-// and each landmark is free to move.
+// each landmark is free to move, and so is the lens within its prior: an error
+// of a wide one differs between rows as well.
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/QR>
@@ -22,8 +23,8 @@ namespace selfcal {
 namespace {
 
 // A shorter readout is not a finding, nor one that is not significant: errors
-// of a factory calibration look like up to 6 ms, and common rolling shutters
-// take 10 ms and more.
+// of a factory calibration looked like up to 6 ms before the lens was fitted as
+// well, and common rolling shutters take 10 ms and more.
 constexpr double kMinReadout_s = 8e-3;
 constexpr double kReadoutSigmas = 6;
 // Readout of a common rolling shutter, which data must be able to show.
@@ -37,38 +38,43 @@ constexpr int kRounds = 5;
 // The limit of Tukey's weights, in robust standard deviations.
 constexpr double kTukey = 4.7;
 
-// An observation: its residual, and its derivatives with respect to a delay of
-// the image and of the rows, from the middle one in units of the image's
-// height; all with those with respect to its landmark removed.
+// The unknowns: a delay of the image, one of the rows, from the middle one in
+// units of the image's height, and errors of the intrinsics.
+constexpr int kRows = 1;
+constexpr int kLens = 2;
+
+// An observation: its residual, and its derivatives by the unknowns; all with
+// those by its landmark removed.
 struct Row {
   int keyframe;  // over all segments
   Eigen::Vector2d r_px;
-  Eigen::Matrix2d by_delay;  // [px/s]
+  Eigen::Matrix2Xd by_unknown;  // [px/s], and as the lens has it
 };
 
 using Track = std::vector<Row>;
 
-struct Delays {
-  Eigen::Vector2d value_s = Eigen::Vector2d::Zero();
-  Eigen::Vector2d sigma_s = Eigen::Vector2d::Constant(HUGE_VAL);
+struct Readout {
+  double value_s = 0;
+  double sigma_s = HUGE_VAL;
 };
 
 // The rows of a landmark without what its position explains.
 Track WithoutPosition(const Track& track, const Eigen::MatrixX3d& by_position) {
   const auto rows = static_cast<Eigen::Index>(2 * track.size());
-  Eigen::MatrixX3d all(rows, 3);
+  const Eigen::Index unknowns = track.front().by_unknown.cols();
+  Eigen::MatrixXd all(rows, 1 + unknowns);
   for (std::size_t i = 0; i < track.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(2 * i);
     all.block<2, 1>(at, 0) = track[i].r_px;
-    all.block<2, 2>(at, 1) = track[i].by_delay;
+    all.block(at, 1, 2, unknowns) = track[i].by_unknown;
   }
-  const Eigen::MatrixX3d left =
+  const Eigen::MatrixXd left =
       all - by_position * by_position.colPivHouseholderQr().solve(all);
   Track result = track;
   for (std::size_t i = 0; i < track.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(2 * i);
     result[i].r_px = left.block<2, 1>(at, 0);
-    result[i].by_delay = left.block<2, 2>(at, 1);
+    result[i].by_unknown = left.block(at, 1, 2, unknowns);
   }
   return result;
 }
@@ -106,12 +112,14 @@ class RowCollector {
                 const CameraCalibration& camera,
                 const KeyframeMotions& motions,
                 const std::vector<const Observation*>& seen) {
-    const int time = kCameraIntrinsics + camera.IntrinsicsSize();
+    const int lens = camera.IntrinsicsSize();
+    const int time = kCameraIntrinsics + lens;
     Track track;
     Eigen::MatrixX3d by_position(2 * seen.size(), 3);
     for (const Observation* o : seen) {
       const KeyframeState& x = segment.keyframes[o->keyframe];
-      Row row{.keyframe = keyframes_ + o->keyframe, .r_px = {}, .by_delay = {}};
+      Row row{
+          .keyframe = keyframes_ + o->keyframe, .r_px = {}, .by_unknown = {}};
       ReprojectionJacobians J;
       if (!Reproject(x.q_GI,
                      x.p_GI,
@@ -124,7 +132,9 @@ class RowCollector {
         continue;
       }
       const double from_middle = o->z_px.y() / camera.height_px - 0.5;
-      row.by_delay << J.camera.col(time), from_middle * J.camera.col(time);
+      row.by_unknown.resize(2, kLens + lens);
+      row.by_unknown << J.camera.col(time), from_middle * J.camera.col(time),
+          J.camera.middleCols(kCameraIntrinsics, lens);
       by_position.middleRows<2>(2 * std::ssize(track)) =
           J.landmark.leftCols<3>();
       track.push_back(row);
@@ -142,61 +152,65 @@ class RowCollector {
   int keyframes_ = 0;
 };
 
-// Robust least squares. Errors of a keyframe's pose are common to its
-// observations: the covariance adds their gradients before it squares them.
-Delays FitDelays(const std::vector<Row>& rows, int keyframes) {
-  Delays delays;
+// Robust least squares, with the prior's sigmas of the lens. Errors of a
+// keyframe's pose are common to its observations: the covariance adds their
+// gradients before it squares them.
+Readout FitReadout(const std::vector<Row>& rows,
+                   int keyframes,
+                   const Eigen::VectorXd& lens_sigmas) {
+  const Eigen::Index size = kLens + lens_sigmas.size();
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(size);
+  Readout readout;
   for (int round = 0; round < kRounds; ++round) {
     std::vector<double> norms;
     norms.reserve(rows.size());
     for (const Row& row : rows) {
-      norms.push_back((row.r_px + row.by_delay * delays.value_s).norm());
+      norms.push_back((row.r_px + row.by_unknown * x).norm());
     }
-    // The median of the norm of two normal errors is 1.1774 of their sigma.
-    const double sigma_px = std::max(UpperMedian(norms) / 1.1774, 1e-9);
-    Eigen::Matrix2d H = Eigen::Matrix2d::Zero();
-    Eigen::Vector2d g = Eigen::Vector2d::Zero();
-    std::vector<Eigen::Vector2d> of_keyframe(keyframes,
-                                             Eigen::Vector2d::Zero());
+    const double sigma_px =
+        std::max(UpperMedian(norms) / kMedianOfRayleigh, 1e-9);
+    Eigen::VectorXd prior = Eigen::VectorXd::Zero(size);
+    prior.tail(lens_sigmas.size()) =
+        (sigma_px * lens_sigmas.cwiseInverse()).cwiseAbs2();
+    Eigen::MatrixXd H = prior.asDiagonal();
+    Eigen::VectorXd g = prior.cwiseProduct(x);
+    Eigen::MatrixXd of_keyframe = Eigen::MatrixXd::Zero(size, keyframes);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double u = norms[i] / (kTukey * sigma_px);
       if (u >= 1) continue;
       const double weight = (1 - u * u) * (1 - u * u);
       const Row& row = rows[i];
-      const Eigen::Vector2d gradient =
-          weight * row.by_delay.transpose() *
-          (row.r_px + row.by_delay * delays.value_s);
-      H += weight * row.by_delay.transpose() * row.by_delay;
+      const Eigen::VectorXd gradient =
+          weight * row.by_unknown.transpose() * (row.r_px + row.by_unknown * x);
+      H += weight * row.by_unknown.transpose() * row.by_unknown;
       g += gradient;
-      of_keyframe[row.keyframe] += gradient;
+      of_keyframe.col(row.keyframe) += gradient;
     }
-    Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
-    for (const Eigen::Vector2d& gradient : of_keyframe) {
-      scatter += gradient * gradient.transpose();
-    }
-    const Eigen::LDLT<Eigen::Matrix2d> ldlt(H);
-    const Eigen::Matrix2d covariance =
+    Eigen::MatrixXd scatter = of_keyframe * of_keyframe.transpose();
+    scatter.diagonal() += sigma_px * sigma_px * prior;
+    const Eigen::LDLT<Eigen::MatrixXd> ldlt(H);
+    const Eigen::MatrixXd covariance =
         ldlt.solve(ldlt.solve(scatter).transpose().eval());
-    delays.value_s -= ldlt.solve(g);
-    delays.sigma_s = covariance.diagonal().cwiseSqrt();
-    if (!delays.value_s.allFinite() || !delays.sigma_s.allFinite()) return {};
+    x -= ldlt.solve(g);
+    readout = {x(kRows), std::sqrt(covariance(kRows, kRows))};
+    if (!x.allFinite() || !std::isfinite(readout.sigma_s)) return {};
   }
-  return delays;
+  return readout;
 }
 
 std::string Camera(std::size_t j) { return "cam" + std::to_string(j); }
 
 void Report(const CameraCalibration& camera,
             std::size_t j,
-            const Delays& delays,
+            const Readout& readout,
             Diagnosis* diagnosis) {
-  const double readout_s = delays.value_s.y();
+  const double readout_s = readout.value_s;
   diagnosis->findings.push_back(
       {FindingKind::kRollingShutter,
        "the rows of " + Camera(j) +
            " were exposed one after the other, the last one about " +
            Figure(1e3 * readout_s) + " ms after the first (sigma " +
-           Figure(1e3 * delays.sigma_s.y()) +
+           Figure(1e3 * readout.sigma_s) +
            " ms), but the calibration has a global shutter",
        "create the rig with about line_delay_s = " +
            Figure(readout_s / camera.height_px) + " for " + Camera(j) +
@@ -226,17 +240,21 @@ void CheckShutter(const Rig& rig,
                                        ": too few tracked landmarks");
       continue;
     }
-    const Delays delays = FitDelays(rows, collector.keyframes());
-    const double sigma_s = delays.sigma_s.y();
+    const Eigen::VectorXd lens_sigmas = PriorSigmas(rig).segment(
+        CameraTangentOffset(theta, static_cast<int>(j)) + kCameraIntrinsics,
+        camera.IntrinsicsSize());
+    const Readout readout =
+        FitReadout(rows, collector.keyframes(), lens_sigmas);
+    const double sigma_s = readout.sigma_s;
     if (kReadoutSigmas * sigma_s > kTold_s) {
       diagnosis->not_checked.push_back("shutter of " + Camera(j) +
                                        ": points hardly move in the image");
       continue;
     }
     seen += rows.size();
-    if (std::abs(delays.value_s.y()) >
+    if (std::abs(readout.value_s) >
         std::max(kMinReadout_s, kReadoutSigmas * sigma_s)) {
-      Report(camera, j, delays, diagnosis);
+      Report(camera, j, readout, diagnosis);
     }
   }
   if (seen > 0) {
