@@ -60,7 +60,7 @@ absl::StatusOr<MemoryPool::Share> TakeRequest(
       SELFCAL_RETURN_IF_ERROR(CheckSize(context, bytes, made));
       // Returned first: two that wait for more would wait for each other.
       work.reset();
-      work = context.work->Acquire(own + made, cancelled);
+      work = context.work->Acquire(own + made, cancelled, true);
       if (!work) return absl::CancelledError("the caller has gone");
     }
   } catch (const std::bad_alloc&) {

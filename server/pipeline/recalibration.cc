@@ -207,9 +207,14 @@ absl::Status Recalibrator::StartDueRuns() {
       look_for_silent_ = now + kSilentInterval;
     }
     if (!estimates_complete_) {
-      SELFCAL_ASSIGN_OR_RETURN(const int written,
-                               shared_.domain->CompleteEstimates(kEstimates));
-      estimates_complete_ = written == 0;
+      // Nothing else depends on it.
+      const auto written = shared_.domain->CompleteEstimates(kEstimates);
+      if (written.ok()) {
+        estimates_complete_ = *written == 0;
+      } else {
+        spdlog::warn("parameters of some versions are not in lists yet: {}",
+                     written.status().ToString());
+      }
     }
   }
   std::vector<std::string> ended = sessions_.Due(SessionEnds::Clock::now());
@@ -278,7 +283,10 @@ absl::StatusOr<Execution> Recalibrator::ExecuteAll(Executor* executor) {
       worst = std::max(worst, executed);
       any |= executed == Execution::kDone && executor->current.open();
       // However many runs there are, others may be due.
-      if (any && std::chrono::steady_clock::now() >= again) break;
+      if (any && worst != Execution::kTryLater &&
+          std::chrono::steady_clock::now() >= again) {
+        break;
+      }
     }
   }
   return worst;

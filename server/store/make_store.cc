@@ -184,7 +184,7 @@ class DatabaseStore final : public Store {
 
   absl::StatusOr<std::vector<Unscored>> ListUnscored(
       int limit, const std::string& replica) override {
-    return Read(
+    return ReadForService(
         [&](Connection* db) { return ListUnscoredRows(db, limit, replica); });
   }
 
@@ -235,7 +235,7 @@ class DatabaseStore final : public Store {
 
   absl::StatusOr<std::vector<VersionId>> ListWithoutEstimates(
       int limit) override {
-    return Read(
+    return ReadForService(
         [&](Connection* db) { return VersionsWithoutEstimates(db, limit); });
   }
 
@@ -252,7 +252,7 @@ class DatabaseStore final : public Store {
 
   absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns(
       const std::string& replica) override {
-    return Read(
+    return ReadForService(
         [&](Connection* db) { return ListUnfinishedRunRows(db, replica); });
   }
 
@@ -262,7 +262,7 @@ class DatabaseStore final : public Store {
 
   absl::StatusOr<std::set<std::string>> FindBusyRigs(
       const std::set<std::string>& rigs) override {
-    return Read([&](Connection* db) { return BusyRigs(db, rigs); });
+    return ReadForService([&](Connection* db) { return BusyRigs(db, rigs); });
   }
 
   absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
@@ -357,9 +357,19 @@ class DatabaseStore final : public Store {
  private:
   // `query` returns a Status or a StatusOr.
   template <typename Query>
-  auto Read(const Query& query) -> std::invoke_result_t<Query, Connection*> {
+  std::invoke_result_t<Query, Connection*> Read(const Query& query) {
+    return ReadBy(&Database::Read, query);
+  }
+  template <typename Query>
+  std::invoke_result_t<Query, Connection*> ReadForService(const Query& query) {
+    return ReadBy(&Database::ReadForService, query);
+  }
+  template <typename Query>
+  std::invoke_result_t<Query, Connection*> ReadBy(
+      absl::Status (Database::*read)(const Database::Work&),
+      const Query& query) {
     std::invoke_result_t<Query, Connection*> result = absl::UnknownError("");
-    const absl::Status status = db_->Read([&](Connection* db) {
+    const absl::Status status = ((*db_).*read)([&](Connection* db) {
       result = query(db);
       return StatusOf(result);
     });

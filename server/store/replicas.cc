@@ -79,7 +79,7 @@ class ReplicasOfDatabase final : public Replicas {
 
   absl::StatusOr<std::vector<ReplicaRecord>> List() override {
     std::vector<ReplicaRecord> records;
-    SELFCAL_RETURN_IF_ERROR(db_->Read([&](Connection* db) {
+    SELFCAL_RETURN_IF_ERROR(db_->ReadForService([&](Connection* db) {
       records.clear();
       Statement read(db, "SELECT replica, beat FROM replicas ORDER BY replica");
       while (read.Next()) records.push_back({read.Text(0), read.Int(1)});
@@ -107,7 +107,7 @@ class ReplicasOfDatabase final : public Replicas {
 
   absl::StatusOr<std::vector<std::string>> ListUnclaimed(int limit) override {
     std::vector<std::string> rigs;
-    SELFCAL_RETURN_IF_ERROR(db_->Read([&](Connection* db) {
+    SELFCAL_RETURN_IF_ERROR(db_->ReadForService([&](Connection* db) {
       rigs.clear();
       Statement read(db,
                      "SELECT id FROM rigs r WHERE rig IN "
@@ -128,7 +128,7 @@ class ReplicasOfDatabase final : public Replicas {
   absl::StatusOr<std::vector<RigClaim>> ListBusy(
       const std::string& replica) override {
     std::vector<RigClaim> busy;
-    SELFCAL_RETURN_IF_ERROR(db_->Read([&](Connection* db) {
+    SELFCAL_RETURN_IF_ERROR(db_->ReadForService([&](Connection* db) {
       busy.clear();
       Statement read(db,
                      "SELECT r.id, c.rig, c.number FROM claims c "

@@ -38,7 +38,8 @@ def _restore(
     in_backup = _send(context, fleet, tried, f"backup-{number}")
     _command("backup", fleet.folder, "--type", "incr" if number else "full")
     in_archive = _send(context, fleet, tried, f"archive-{number}")
-    for text in checks.settled(fleet, [d.rig_id for d in (in_backup, in_archive)]):
+    sent = [in_backup.rig_id, in_archive.rig_id]
+    for text in checks.settled(fleet, sent):
         tried.fail(text)
     restore_to = str(fleet.query("SELECT clock_timestamp()")[0][0])
     time.sleep(1)

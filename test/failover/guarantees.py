@@ -135,7 +135,9 @@ def _partition(context, tried, load, number, devices, databases) -> None:
     if where.startswith("one"):
         # The others serve its devices meanwhile.
         what = f"{where}: {verb}"
-        _wait_until_back(tried, load, begin, what, 0)
+        _wait_until_back(tried, load, begin, what)
+        # Longer than the lease of its claims.
+        time.sleep(max(0, begin + length - time.monotonic()))
     else:
         time.sleep(length)
         begin = time.monotonic()

@@ -199,6 +199,9 @@ class Database {
   virtual void BeginWrite(Work work, Done done) = 0;
   // Runs `query` on a single state of the database.
   virtual absl::Status Read(const Work& query) = 0;
+  // Read for the work of the daemon itself: it never waits for reads of
+  // callers.
+  virtual absl::Status ReadForService(const Work& query) { return Read(query); }
   // A connection of the caller's own that only reads, for what takes long. The
   // database must outlive it.
   virtual absl::StatusOr<std::unique_ptr<Connection>> OpenReader() = 0;

@@ -33,10 +33,14 @@ constexpr char kLimitWrites[] =
     "SET idle_in_transaction_session_timeout = '10s';"
     "SET lock_timeout = '5s'";
 
-// Pages of lists take some ten milliseconds. What takes this long, a filter
-// that no index serves, must not hold the few connections that read for longer
-// than other daemons wait for a sign of life (ReplicaOptions::lease).
-constexpr char kLimitReads[] = "SET statement_timeout = '5s'";
+// Pages of lists take some ten milliseconds: what takes this long is a filter
+// that no index serves.
+constexpr char kLimitReads[] = "SET statement_timeout = '30s'";
+
+std::vector<std::unique_ptr<PostgresConnection>> Unopened(int count) {
+  return std::vector<std::unique_ptr<PostgresConnection>>(
+      static_cast<std::size_t>(count));
+}
 
 // A number of its own for each thread that calls.
 std::size_t NumberOfThread() {
@@ -65,7 +69,8 @@ std::string NewOrigin() {
 PostgresDatabase::PostgresDatabase(std::string uri, int writers, int readers)
     : uri_(std::move(uri)),
       origin_(NewOrigin()),
-      idle_readers_(static_cast<std::size_t>(readers)) {
+      for_callers_{kLimitReads, {}, {}, Unopened(readers)},
+      for_service_{"", {}, {}, Unopened(kServiceReaders)} {
   for (int k = 0; k < writers; ++k) {
     Writer* const writer =
         writers_.emplace_back(std::make_unique<Writer>()).get();
@@ -104,13 +109,15 @@ PostgresDatabase::Connect() {
 absl::Status PostgresDatabase::CarryOut(
     const Work& work,
     bool is_read,
+    const std::string& settings,
     std::unique_ptr<PostgresConnection>* connection) {
   for (int attempt = 1;; ++attempt) {
     if (*connection == nullptr || (*connection)->lost()) {
       connection->reset();  // before the next one counts
       SELFCAL_ASSIGN_OR_RETURN(auto opened, Connect());
-      SELFCAL_RETURN_IF_ERROR(
-          opened->Execute(is_read ? kLimitReads : kLimitWrites));
+      if (!settings.empty()) {
+        SELFCAL_RETURN_IF_ERROR(opened->Execute(settings));
+      }
       *connection = std::move(opened);
     }
     PostgresConnection* const db = connection->get();
@@ -155,19 +162,27 @@ void PostgresDatabase::RunWriter(Writer* writer) {
       const Job job = std::move(writer->queue.front());
       writer->queue.pop_front();
       lock.unlock();
-      job.done(CarryOut(job.work, false, &writer->connection));
+      job.done(CarryOut(job.work, false, kLimitWrites, &writer->connection));
     }  // releases its memory before taking the lock
     lock.lock();
   }
 }
 
 absl::Status PostgresDatabase::Read(const Work& query) {
+  return ReadWith(query, &for_callers_);
+}
+
+absl::Status PostgresDatabase::ReadForService(const Work& query) {
+  return ReadWith(query, &for_service_);
+}
+
+absl::Status PostgresDatabase::ReadWith(const Work& query, Readers* readers) {
   std::unique_ptr<PostgresConnection> connection;
   {
-    std::unique_lock lock(readers_mutex_);
-    reader_returned_.wait(lock, [this] { return !idle_readers_.empty(); });
-    connection = std::move(idle_readers_.back());
-    idle_readers_.pop_back();
+    std::unique_lock lock(readers->mutex);
+    readers->returned.wait(lock, [&] { return !readers->idle.empty(); });
+    connection = std::move(readers->idle.back());
+    readers->idle.pop_back();
   }
   const absl::Status status = CarryOut(
       [&query](Connection* db) -> absl::Status {
@@ -176,12 +191,13 @@ absl::Status PostgresDatabase::Read(const Work& query) {
         return query(db);
       },
       true,
+      readers->settings,
       &connection);
   {
-    const std::lock_guard lock(readers_mutex_);
-    idle_readers_.push_back(std::move(connection));
+    const std::lock_guard lock(readers->mutex);
+    readers->idle.push_back(std::move(connection));
   }
-  reader_returned_.notify_one();
+  readers->returned.notify_one();
   return status;
 }
 

@@ -36,8 +36,11 @@ namespace selfcal::server {
 
 class PostgresDatabase final : public Database {
  public:
+  static constexpr int kServiceReaders = 2;
+
   // Connections are opened when they are first needed, at most `writers` that
-  // write and `readers` that read, besides those of OpenReader.
+  // write, `readers` that read and kServiceReaders that read for the service,
+  // besides those of OpenReader.
   PostgresDatabase(std::string uri, int writers, int readers);
   // Carries out the queued writes.
   ~PostgresDatabase() override;
@@ -46,7 +49,9 @@ class PostgresDatabase final : public Database {
 
   absl::Status Write(Work work) override;
   void BeginWrite(Work work, Done done) override;
+  // UNAVAILABLE for a statement that takes too long.
   absl::Status Read(const Work& query) override;
+  absl::Status ReadForService(const Work& query) override;
   absl::StatusOr<std::unique_ptr<Connection>> OpenReader() override;
   std::unique_ptr<Listener> Listen(const Listener::Heard& heard) override;
 
@@ -67,13 +72,24 @@ class PostgresDatabase final : public Database {
     std::unique_ptr<PostgresConnection> connection;  // of the thread alone
     std::thread thread;
   };
+  // Connections that read.
+  struct Readers {
+    const std::string settings;  // SQL; empty: none
+    std::mutex mutex;            // guards `idle`
+    std::condition_variable returned;
+    // Those that are not in use; null ones are not open yet.
+    std::vector<std::unique_ptr<PostgresConnection>> idle;
+  };
 
+  absl::Status ReadWith(const Work& query, Readers* readers);
   void RunWriter(Writer* writer);
   absl::StatusOr<std::unique_ptr<PostgresConnection>> Connect();
-  // Runs `work` on *connection, which is opened again if it is null or lost,
-  // as often as it takes; a read also if its outcome is not known.
+  // Runs `work` on *connection, which is opened again, with `settings`, if it
+  // is null or lost, as often as it takes; a read also if its outcome is not
+  // known.
   absl::Status CarryOut(const Work& work,
                         bool is_read,
+                        const std::string& settings,
                         std::unique_ptr<PostgresConnection>* connection);
 
   const std::string uri_;
@@ -81,10 +97,8 @@ class PostgresDatabase final : public Database {
   std::vector<std::unique_ptr<Writer>> writers_;
   std::atomic<std::int64_t> retries_ = 0;
 
-  std::mutex readers_mutex_;  // guards idle_readers_
-  std::condition_variable reader_returned_;
-  // Connections that are not in use; null ones are not open yet.
-  std::vector<std::unique_ptr<PostgresConnection>> idle_readers_;
+  Readers for_callers_;
+  Readers for_service_;
 
   std::mutex failure_mutex_;  // guards what follows
   absl::Status failure_;      // of the last attempt to connect
