@@ -131,7 +131,7 @@ class Counter {
     return kUnknown;
   }
 
-  // Of another form than the contract's, a field is not known.
+  // A field of another form than the contract's is not known.
   static const TypeLayout::Field& FieldOf(const TypeLayout& layout,
                                           std::uint32_t tag) {
     const auto number =

@@ -46,8 +46,8 @@ CameraCalibration ReadCamera(const YAML::Node& entry) {
   const bool distorts = Has(camera, "distortion");
   const std::string projection =
       Has(camera, "type") ? GetText(camera, "type") : "pinhole";
-  const std::string type =
-      distorts ? GetText(Get(camera, "distortion"), "type") : "radtan";
+  const std::string type = distorts ? GetText(Get(camera, "distortion"), "type")
+                                    : "radial-tangential";
   const auto found =
       FindModel("maplab", projection, type, [](const auto&) { return true; });
   if (!found) {

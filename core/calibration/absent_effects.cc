@@ -173,8 +173,8 @@ class EffectTests {
   const std::vector<int> free_;  // with all effects
   const OffsetInformation sum_;  // of the free components
   std::vector<int> theta_;       // what the rig estimates, in the free ones
-  // Of these, in units of the prior's sigmas: the covariance of the data, and
-  // the sigmas of the calibration.
+  // The covariance of these by the data alone, and their sigmas in the
+  // calibration, in units of the prior's sigmas.
   Eigen::MatrixXd of_data_;
   Eigen::VectorXd sigmas_;
 };

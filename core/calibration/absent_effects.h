@@ -39,8 +39,8 @@ struct AbsentEffect {
 };
 
 // `rig` states the noise that the calibration was weighted with;
-// `covariance_of_data` (D x D, tangent at calibration.theta) is that without
-// remembered segments. Segments that
+// `covariance_of_data` (D x D) is that without remembered segments
+// (CalibrationResult). Segments that
 // the calibration does not accept (ConsistencyTester) are ignored. In the order
 // of theta; without effects that the rig estimates. None if `segments` is
 // empty.

@@ -99,7 +99,7 @@ struct CalibrationResult {
   // that no sigma is small for a parameter that was not observed.
   Eigen::MatrixXd covariance;
   // The same of the data alone, without remembered segments and the doubt about
-  // a device change; empty if they change nothing.
+  // a device change, at the theta without them; empty if they change nothing.
   Eigen::MatrixXd covariance_of_data;
   // Information about theta (D x D, tangent at theta) of the data and of the
   // remembered segments, also along directions that were held constant.

@@ -103,7 +103,7 @@ class Fusion {
     });
   }
 
-  // Of those without data, the one that was received last.
+  // The one without data that was received last.
   SegmentKey Newest() const {
     const JoinedSegment* newest = nullptr;
     for (const JoinedSegment& one : joined_) {

@@ -72,7 +72,7 @@ struct RememberedUse {
   // without a change.
   double change_probability = 0;
   Eigen::VectorXd change_sigmas = {};
-  // Of the segments that contribute, the one that was received last.
+  // The one that was received last of those that do not contradict.
   SegmentKey newest = {};
 };
 

@@ -23,8 +23,8 @@ namespace selfcal {
 namespace {
 
 // A shorter readout is not a finding, nor one that is not significant: errors
-// of a factory calibration looked like up to 6 ms before the lens was fitted as
-// well, and common rolling shutters take 10 ms and more.
+// of a factory calibration look like up to 6 ms where the lens is held
+// constant, and common rolling shutters take 10 ms and more.
 constexpr double kMinReadout_s = 8e-3;
 constexpr double kReadoutSigmas = 6;
 // Readout of a common rolling shutter, which data must be able to show.

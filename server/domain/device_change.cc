@@ -84,16 +84,18 @@ absl::StatusOr<bool> IsTestable(UnitOfWork* tx,
   return run.change == change;
 }
 
-// 0: it is gone.
-absl::StatusOr<std::int64_t> SequenceOf(UnitOfWork* tx, const SegmentKey& key) {
+// nullopt: it is gone.
+absl::StatusOr<std::optional<std::int64_t>> SequenceOf(UnitOfWork* tx,
+                                                       const SegmentKey& key) {
   const auto segment = FindSegment(tx, key);
-  if (absl::IsNotFound(segment.status())) return 0;
+  if (absl::IsNotFound(segment.status())) return std::nullopt;
   SELFCAL_RETURN_IF_ERROR(segment.status());
   return segment->sequence;
 }
 
-// The newest segment without data that the calibration rests on; 0: none.
-absl::StatusOr<std::int64_t> NewestRemembered(
+// The newest segment without data that the calibration rests on; 0: none;
+// nullopt: it is not known.
+absl::StatusOr<std::optional<std::int64_t>> NewestRemembered(
     UnitOfWork* tx, const StoredCalibration& calibration) {
   if (!calibration.report || calibration.report->remembered.segments == 0) {
     return 0;
@@ -101,15 +103,20 @@ absl::StatusOr<std::int64_t> NewestRemembered(
   return SequenceOf(tx, calibration.report->remembered.newest);
 }
 
-absl::StatusOr<std::int64_t> NewestIncluded(
-    UnitOfWork* tx, const StoredCalibration& calibration) {
-  SELFCAL_ASSIGN_OR_RETURN(std::int64_t newest,
+// Returns whether the calibration rests on a segment from `first_sequence` on,
+// or may do so.
+absl::StatusOr<bool> RestsOnAnySince(UnitOfWork* tx,
+                                     const StoredCalibration& calibration,
+                                     std::int64_t first_sequence) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::optional<std::int64_t> newest,
                            NewestRemembered(tx, calibration));
+  if (!newest || *newest >= first_sequence) return true;
   for (const SegmentKey& key : calibration.segments) {
-    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t sequence, SequenceOf(tx, key));
-    newest = std::max(newest, sequence);
+    SELFCAL_ASSIGN_OR_RETURN(const std::optional<std::int64_t> sequence,
+                             SequenceOf(tx, key));
+    if (sequence && *sequence >= first_sequence) return true;
   }
-  return newest;
+  return false;
 }
 
 // The newest version up to `version` that rests on none of the segments from
@@ -129,9 +136,9 @@ absl::StatusOr<std::int64_t> VersionBefore(UnitOfWork* tx,
     SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
                              ReadRun(tx, *calibration->run));
     if (run.change != change) return kFactory;
-    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest,
-                             NewestIncluded(tx, *calibration));
-    if (newest < first_sequence) return version;
+    SELFCAL_ASSIGN_OR_RETURN(const bool rests,
+                             RestsOnAnySince(tx, *calibration, first_sequence));
+    if (!rests) return version;
     version = run.base_version;
   }
   return kFactory;
@@ -234,9 +241,10 @@ absl::StatusOr<NewestExamined> ExamineNewest(UnitOfWork* tx,
   }
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t since_change,
                            FirstSequenceSince(tx, newest_change));
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t remembered,
+  SELFCAL_ASSIGN_OR_RETURN(const std::optional<std::int64_t> remembered,
                            NewestRemembered(tx, *active));
-  const std::int64_t first_sequence = std::max(since_change, remembered + 1);
+  const std::int64_t first_sequence =
+      std::max(since_change, remembered.value_or(0) + 1);
   const ConsistencyTester tester(
       rig.rig,
       {active->theta,

@@ -5,7 +5,6 @@
 
 #include "core/change/concerned.h"
 #include "core/change/group_concern.h"
-#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 
@@ -24,15 +23,6 @@ Eigen::MatrixXd LessCertain(const Rig& rig,
 }
 
 }  // namespace
-
-absl::StatusOr<bool> IsFromBefore(Store* store,
-                                  const StoredCalibration& version,
-                                  std::int64_t change) {
-  if (!version.run) return true;
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
-                           store->GetRun(version.rig, *version.run));
-  return run.change < change;
-}
 
 ThetaPrior KnownAfter(const Rig& rig,
                       const StoredChange& change,

@@ -1,10 +1,8 @@
-// What remains known of a calibration from before a device change.
+// The knowledge that remains of a calibration from before a device change. Pure
+// functions.
 #pragma once
 
-#include <absl/status/statusor.h>
-
 #include <Eigen/Core>
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,13 +14,6 @@
 #include "server/store/store.h"
 
 namespace selfcal::server {
-
-// True for the factory calibration, and for a version whose run was created
-// before the change was found, even if that run found it: its tables held
-// segments from before.
-absl::StatusOr<bool> IsFromBefore(Store* store,
-                                  const StoredCalibration& version,
-                                  std::int64_t change);
 
 // `since` is the information of the segments since the change, `before` the
 // calibration from before it (StoredChange::base_version). Groups that the

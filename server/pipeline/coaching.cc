@@ -65,12 +65,13 @@ absl::StatusOr<RigCoaching> RigCoach::Advise(const std::string& rig_name) {
   const std::vector<TableEntry> in_tables = UnionOfTables(tables);
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
                            InformationSince(store_, active, in_tables));
-  if (change) {
-    SELFCAL_ASSIGN_OR_RETURN(const bool from_before,
-                             IsFromBefore(store_, active, change->change));
-    if (from_before && active.run) {
-      active.covariance = CovarianceAfter(rig.rig, *change, active, since);
+  if (change && active.changed_since == change->change) {
+    StoredCalibration before = active;
+    if (active.version > change->base_version) {
+      SELFCAL_ASSIGN_OR_RETURN(
+          before, store_->GetCalibration(rig_name, change->base_version));
     }
+    active.covariance = CovarianceAfter(rig.rig, *change, before, since);
   }
   const Eigen::MatrixXd known =
       KnownInformation(rig.rig, active.theta, active.covariance, since);

@@ -49,6 +49,18 @@ bool IsExcluded(const CalibrationResult& result, const SegmentKey& key) {
                      });
 }
 
+// True for the factory calibration, and for a version whose run was created
+// before the change was found, even if that run found it: its tables held
+// segments from before.
+absl::StatusOr<bool> IsFromBefore(Store* store,
+                                  const StoredCalibration& active,
+                                  std::int64_t change) {
+  if (!active.run) return true;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
+                           store->GetRun(active.rig, *active.run));
+  return run.change < change;
+}
+
 // nullopt if the data cannot be used; an error if it cannot be read now.
 absl::StatusOr<std::optional<SegmentInformation>> Rescore(
     const RunContext& context,
@@ -183,7 +195,10 @@ absl::StatusOr<std::string> Validate(const RunContext& context,
       }
       evidence.active.covariance =
           CovarianceAfter(rig.rig, change, before, since);
-      evidence.changed = ConcernedComponents(rig.rig, change.groups);
+      // Without an estimate from before, nothing is known of the others.
+      evidence.changed = before.run
+                             ? ConcernedComponents(rig.rig, change.groups)
+                             : FreeComponents(rig.rig);
     }
   }
   SELFCAL_ASSIGN_OR_RETURN(evidence.held_out,

@@ -264,9 +264,9 @@ struct StoredChange {
   ChangeKind kind = ChangeKind::kSudden;
   // Segments with a smaller sequence lie before it.
   std::int64_t first_sequence = 0;
-  // What this version knows of groups that are not concerned remains known. It
-  // was active, or is an earlier one without segments from after the change; 1:
-  // there is none, and nothing is known.
+  // The version whose knowledge of groups that are not concerned remains valid:
+  // the one that was active, or an earlier one without segments from after the
+  // change; 1: there is none, and nothing is known.
   std::int64_t base_version = 0;
   std::vector<std::string> groups;  // concerned
   double inflation = 1;             // factor on the variances of segments

@@ -99,7 +99,8 @@ TEST(ParsedSize, FieldsThatAreNotKnownCount) {
   }
 }
 
-// Of another form than the contract has, and in groups, of which it has none.
+// Protobuf keeps fields of another form than the contract's, and those in groups,
+// as unknown ones.
 TEST(ParsedSize, FieldsOfAnotherFormCount) {
   // CreateRigRequest.rig and Rig.name (both 1) as numbers, fixed ones and
   // groups; GetRigRequest.name in a group.

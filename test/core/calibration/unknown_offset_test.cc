@@ -38,7 +38,7 @@ TEST(Calibrate, FindsATimeOffsetThatNobodyKnows) {
   }
 }
 
-// What is not estimated stays as it is stated, whatever the segments show.
+// A value that is not estimated stays as it is stated.
 TEST(Calibrate, ADriftThatIsHeldIsNotMoved) {
   constexpr double kDrift = 1e-6;
   DeviceOfUnknownOffset device = WithOffset(0.05, 5);

@@ -333,12 +333,12 @@ class SplitRunTest : public ChangesTest {
     ASSERT_TRUE(domain_->BeginRun("a", run_.run).ok());
   }
 
-  // A version that rests on all segments so far.
-  StoredCalibration FinishOnAll() {
+  // A version that rests on all segments so far; `session`: that of the newest.
+  StoredCalibration FinishOnAll(const std::string& session = "s") {
     BeginNext();
     StoredCalibration result = Result(rig_.factory);
     result.report->remembered.segments = 1;
-    result.report->remembered.newest = {"s", next_ - 1};
+    result.report->remembered.newest = {session, next_ - 1};
     const auto finished = domain_->FinishRun("a", run_.run, result);
     EXPECT_TRUE(finished.ok()) << finished.status();
     return finished.value_or(StoredCalibration());
@@ -426,6 +426,14 @@ TEST_P(SplitRunTest, WhatRemainsKnownIsNotFromTheSegmentsSince) {
   ASSERT_EQ(FinishSplit(1e-6, "", newest + 1).version, 5);
   EXPECT_EQ(run_.base_version, 4);
   EXPECT_EQ(store_->GetChange("a", 1)->base_version, third.version);
+}
+
+// As of a segment that was deleted.
+TEST_P(SplitRunTest, NorFromAVersionThatMayRestOnThem) {
+  FinishOnAll("deleted");
+  FinishSplit(1e-6, "", next_);
+  EXPECT_EQ(run_.base_version, 3);
+  EXPECT_EQ(store_->GetChange("a", 1)->base_version, 2);
 }
 
 TEST_P(SplitRunTest, IfEveryVersionRestsOnThemNothingRemainsKnown) {

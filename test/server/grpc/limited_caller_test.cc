@@ -217,7 +217,7 @@ TEST_F(LimitedCallerTest, WatchTellsOfTheRigsOfTheCallerAlone) {
   context.TryCancel();
 }
 
-// What it has not been sent by then, it does not get.
+// It does not get what it has not been sent by then.
 TEST_F(LimitedCallerTest, AWatchEndsOnceItsRigHasLostTheLabel) {
   Context context;
   context.set_deadline(std::chrono::system_clock::now() + kAnswered);
