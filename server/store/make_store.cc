@@ -358,14 +358,14 @@ class DatabaseStore final : public Store {
   // `query` returns a Status or a StatusOr.
   template <typename Query>
   std::invoke_result_t<Query, Connection*> Read(const Query& query) {
-    return ReadBy(&Database::Read, query);
+    return ReadWith(&Database::Read, query);
   }
   template <typename Query>
   std::invoke_result_t<Query, Connection*> ReadForService(const Query& query) {
-    return ReadBy(&Database::ReadForService, query);
+    return ReadWith(&Database::ReadForService, query);
   }
   template <typename Query>
-  std::invoke_result_t<Query, Connection*> ReadBy(
+  std::invoke_result_t<Query, Connection*> ReadWith(
       absl::Status (Database::*read)(const Database::Work&),
       const Query& query) {
     std::invoke_result_t<Query, Connection*> result = absl::UnknownError("");

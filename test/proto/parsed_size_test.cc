@@ -99,8 +99,8 @@ TEST(ParsedSize, FieldsThatAreNotKnownCount) {
   }
 }
 
-// Protobuf keeps fields of another form than the contract's, and those in groups,
-// as unknown ones.
+// Protobuf keeps fields of another form than the contract's, and those in
+// groups, as unknown ones.
 TEST(ParsedSize, FieldsOfAnotherFormCount) {
   // CreateRigRequest.rig and Rig.name (both 1) as numbers, fixed ones and
   // groups; GetRigRequest.name in a group.
