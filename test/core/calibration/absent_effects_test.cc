@@ -202,25 +202,30 @@ TEST_P(EachEffect, IsFoundWithItsShiftWithinAFactorOfTwo) {
   }
 }
 
+// The positions of the axes are found to shift theta by as much as they do.
+void ExpectBias(const Device& device, const Device& without) {
+  const AbsentEffect found = MostLikely(EffectsOf(device));
+  EXPECT_EQ(found.block, "imu.accel.position");
+  const double shift =
+      BoxMinus(device.result.theta, without.result.theta)
+          .cwiseQuotient(
+              device.result.covariance.diagonal().cwiseSqrt().cwiseMax(1e-12))
+          .cwiseAbs()
+          .maxCoeff();
+  std::printf("%s %.2f sigma, shifted by at most %.2f\n",
+              found.component.c_str(),
+              found.bias_sigmas,
+              shift);
+  EXPECT_GT(found.bias_sigmas, shift / 2);
+  EXPECT_LT(found.bias_sigmas, 3 * shift);
+}
+
 // An effect shifts a calibration furthest where the motion shows it least.
 TEST(AbsentEffects, AreNotTooSmallInFewSegments) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Device without = CalibrateDevice(NoEffect, seed, {}, 8);
     const Device device = CalibrateDevice(MoveAxesApart, seed, {}, 8);
-    const AbsentEffect found = MostLikely(EffectsOf(device));
-    EXPECT_EQ(found.block, "imu.accel.position");
-    const double shift =
-        BoxMinus(device.result.theta, without.result.theta)
-            .cwiseQuotient(
-                device.result.covariance.diagonal().cwiseSqrt().cwiseMax(1e-12))
-            .cwiseAbs()
-            .maxCoeff();
-    std::printf("%s %.2f sigma, shifted by at most %.2f\n",
-                found.component.c_str(),
-                found.bias_sigmas,
-                shift);
-    EXPECT_GT(found.bias_sigmas, shift / 2);
-    EXPECT_LT(found.bias_sigmas, 3 * shift);
+    ExpectBias(device, without);
   }
 }
 
@@ -231,20 +236,7 @@ TEST(AbsentEffects, AreNotTooSmallBesideRememberedSegments) {
         Remembering(CalibrateDevice(NoEffect, seed, {}, 33), 4);
     const Device device =
         Remembering(CalibrateDevice(MoveAxesApart, seed, {}, 33), 4);
-    const AbsentEffect found = MostLikely(EffectsOf(device));
-    EXPECT_EQ(found.block, "imu.accel.position");
-    const double shift =
-        BoxMinus(device.result.theta, without.result.theta)
-            .cwiseQuotient(
-                device.result.covariance.diagonal().cwiseSqrt().cwiseMax(1e-12))
-            .cwiseAbs()
-            .maxCoeff();
-    std::printf("%s %.2f sigma, shifted by at most %.2f\n",
-                found.component.c_str(),
-                found.bias_sigmas,
-                shift);
-    EXPECT_GT(found.bias_sigmas, shift / 2);
-    EXPECT_LT(found.bias_sigmas, 3 * shift);
+    ExpectBias(device, without);
   }
 }
 
