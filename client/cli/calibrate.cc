@@ -308,8 +308,7 @@ void AddCalibrate(CLI::App* app, Context* context) {
                    input->camera_model,
                    "Model of a camera without a calibration, whose values are "
                    "guessed then: a lens that sees 100 degrees or more needs "
-                   "fov, equidistant, unified, extended-unified or "
-                   "double-sphere")
+                   "another than the radial-tangential ones")
       ->check(OneOf(models))
       ->capture_default_str();
   command
