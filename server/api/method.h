@@ -68,7 +68,7 @@ struct Method {
                ExchangeHandler>
       handler;
   // Bytes that the handler takes for what it parses from the request; null:
-  // none. Of methods with one request and one response.
+  // none. Only methods with one request and one response have it.
   std::function<std::int64_t(const Message& request)> work = nullptr;
 };
 

@@ -1,4 +1,4 @@
-"""What a backup and the archive bring back."""
+"""A restore from a backup and the archive."""
 
 import pathlib
 import subprocess
@@ -20,7 +20,7 @@ _SENT_S = 120
 
 
 def restore(context: Context, tried: Tried, trials: int) -> None:
-    """On a fleet of its own, with an archive."""
+    """Uses a fleet of its own, with an archive."""
     tried.after = "serves again"
     folder = context.fleet.folder.with_name("archived")
     fleet = RunningFleet(folder, context.program)

@@ -46,7 +46,7 @@ TEST(Calibrate, ADriftThatIsHeldIsNotMoved) {
   rig.blocks = {{"*.time_offset", true}, {"*.time_drift", false}};
   std::vector<MotionSegment> segments = device.session.segments;
   rig.factory.cameras[0].time_drift = kDrift;
-  // Of sessions of one minute each: the shifts differ by their errors.
+  // Each is a minute after the one before: the shifts differ by their errors.
   for (std::size_t s = 0; s < segments.size(); ++s) {
     segments[s].key.session = "s" + std::to_string(s);
     segments[s].session_start_ns =

@@ -14,6 +14,7 @@
 #include "core/change/theta_parts.h"
 #include "core/model/parameter_blocks.h"
 #include "test/core/change/random_information.h"
+#include "test/core/simulation/rigs.h"
 
 namespace selfcal {
 namespace {
@@ -27,11 +28,8 @@ using ::testing::IsEmpty;
 // what no segment tells cannot be tested.
 Rig RigOfAllBlocks() {
   Rig rig = HandheldRig("all");
-  AddSecondImu(&rig);
-  rig.blocks = {{"*", true}};
-  AddEstimatedBlocks(rig.blocks, &rig.factory);
+  EstimateEveryBlock(&rig);
   rig.fixed = {"imu.accel.position.x.*", "imu1.accel.position.x.*"};
-  rig.groups = DefaultGroups(rig.blocks, rig.factory);
   for (const TangentComponent& one : TangentComponents(rig.factory)) {
     rig.prior_sigmas.push_back({one.name, 10 * one.sigma_ref});
   }

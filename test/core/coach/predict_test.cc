@@ -42,10 +42,7 @@ TEST(Predict, HasInformationForEveryMotion) {
 // Ten degrees above the reference temperature, slopes show as well.
 TEST(Predict, HasInformationAboutEveryBlockThatThereIs) {
   Rig rig = HandheldRig("r");
-  AddSecondImu(&rig);
-  rig.blocks = {{"*", true}};
-  AddEstimatedBlocks(rig.blocks, &rig.factory);
-  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  EstimateEveryBlock(&rig);
   PredictOptions options;
   options.simulation.temperature_c = rig.factory.reference_temperature_c + 10;
   const auto components = TangentComponents(rig.factory);

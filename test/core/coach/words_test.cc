@@ -12,8 +12,7 @@ namespace {
 
 TEST(Words, EveryComponentHasItsOwn) {
   Rig rig = RigOfCameras(4);
-  AddSecondImu(&rig);
-  AddEstimatedBlocks({{"*", true}}, &rig.factory);
+  EstimateEveryBlock(&rig);
   std::set<std::string> all;
   const auto components = TangentComponents(rig.factory);
   for (const TangentComponent& component : components) {

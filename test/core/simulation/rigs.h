@@ -97,6 +97,14 @@ inline Rig LensRig(DistortionModel model) {
   return rig;
 }
 
+// Adds a second IMU and estimates every block that there is.
+inline void EstimateEveryBlock(Rig* rig) {
+  AddSecondImu(rig);
+  rig->blocks = {{"*", true}};
+  AddEstimatedBlocks(rig->blocks, &rig->factory);
+  rig->groups = DefaultGroups(rig->blocks, rig->factory);
+}
+
 // A rig of one camera with another of the same kind 11 cm to its right, as SLAM
 // systems for stereo need them.
 inline Rig TwinRig(Rig rig) {

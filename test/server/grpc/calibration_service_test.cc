@@ -7,6 +7,7 @@
 #include "core/model/so3.h"
 #include "server/encode/compare.h"
 #include "server/encode/encode.h"
+#include "test/core/simulation/rigs.h"
 #include "test/server/grpc/service_test.h"
 
 namespace selfcal::server {
@@ -529,10 +530,7 @@ constexpr std::pair<const char*, const char*> kOptionalComponents[] = {
 
 TEST_F(CalibrationServiceTest, EveryBlockThatDiffersIsComparedInItsUnit) {
   Rig rig = TestRig("all");
-  AddSecondImu(&rig);
-  rig.blocks = {{"*", true}};
-  AddEstimatedBlocks(rig.blocks, &rig.factory);
-  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  EstimateEveryBlock(&rig);
   const auto created = domain_->CreateRig(rig);
   ASSERT_TRUE(created.ok()) << created.status();
   const Eigen::VectorXd sigmas = ReferenceSigmas(rig);
