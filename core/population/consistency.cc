@@ -112,13 +112,14 @@ PriorAgreement CompareWithPrior(const Rig& rig,
   result.degrees = observed.degrees;
   if (result.degrees == 0) return result;
   result.probability = ChiSquareTail(result.statistic, result.degrees);
-  // An error of the prior by that ratio adds to the error of the estimate as
-  // far as this still rests on the prior.
+  // An error of the prior by that ratio is an error of the estimate in the
+  // directions that the run held constant.
   const double variance_ratio =
       std::max(1.0, result.statistic / result.degrees);
   result.prior_error_ratio = std::sqrt(variance_ratio);
-  result.error_ratio = std::sqrt(
-      1 + (variance_ratio - 1) * (device.information + 1).inverse().mean());
+  result.error_ratio =
+      std::sqrt(1 + (variance_ratio - 1) *
+                        (device.information < 1).cast<double>().mean());
   return result;
 }
 

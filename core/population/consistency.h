@@ -49,8 +49,8 @@ struct PriorAgreement {
 };
 
 // Compares the data of a device with the prior of its rig, PriorSigmas(rig)
-// about rig.factory. `theta` with `covariance` (D x D, tangent at theta) is the
-// calibration that started from it (DeviceInformation).
+// about rig.factory. `theta` with `covariance` (D x D, tangent at theta) is
+// that of a calibration run (DeviceInformation).
 PriorAgreement CompareWithPrior(const Rig& rig,
                                 const Calibration& theta,
                                 const Eigen::MatrixXd& covariance);

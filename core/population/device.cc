@@ -1,57 +1,42 @@
 #include "core/population/device.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <vector>
 
 #include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
+namespace {
+
+// Directions that were held constant have the variance of the prior, 1 in its
+// units, to rounding, or more where the covariance was widened.
+constexpr double kHeldVariance = 1 - 1e-6;
+
+}  // namespace
 
 ThetaInformation DeviceInformation(const Rig& rig,
                                    const Calibration& theta,
                                    const Eigen::MatrixXd& covariance,
                                    const Calibration& reference) {
   const std::vector<int> free = FreeComponents(rig);
-  const Eigen::VectorXd scale = PriorSigmas(rig)(free);
-  const auto size = static_cast<Eigen::Index>(free.size());
-  const auto identity = Eigen::MatrixXd::Identity(size, size);
+  const Eigen::VectorXd inverse_scale = PriorSigmas(rig)(free).cwiseInverse();
+  const SymmetricEigen posterior(inverse_scale.asDiagonal() *
+                                 covariance(free, free) *
+                                 inverse_scale.asDiagonal());
+  const Eigen::VectorXd information =
+      (posterior.eigenvalues().array() < kHeldVariance)
+          .select(posterior.eigenvalues().cwiseInverse(), 0.0);
+  const Eigen::MatrixXd& U = posterior.eigenvectors();
 
-  // In units of the prior's sigmas, about theta.
-  const Eigen::VectorXd inverse_scale = scale.cwiseInverse();
-  const Eigen::MatrixXd posterior = inverse_scale.asDiagonal() *
-                                    covariance(free, free) *
-                                    inverse_scale.asDiagonal();
-  const Eigen::MatrixXd prior_by_offset =
-      ThetaByOffset(rig.factory, BoxMinus(theta, rig.factory));
-  const Eigen::MatrixXd offset_by_theta =
-      inverse_scale.asDiagonal() *
-      prior_by_offset(free, free).inverse().eval() * scale.asDiagonal();
-  const Eigen::MatrixXd prior = offset_by_theta.transpose() * offset_by_theta;
-  const Eigen::MatrixXd data = posterior.llt().solve(identity) - prior;
-
-  // A covariance that was widened has less information than the prior in
-  // directions without data: nothing is known of these.
-  const SymmetricEigen eigen(0.5 * (data + data.transpose()));
-  const Eigen::VectorXd known =
-      (eigen.eigenvalues().array() > 0).cast<double>();
-  const Eigen::MatrixXd& U = eigen.eigenvectors();
-  const Eigen::MatrixXd Lambda =
-      U * eigen.eigenvalues().cwiseMax(0).asDiagonal() * U.transpose();
-  // Data and prior balance at the maximum of the posterior.
-  const Eigen::VectorXd from_factory =
-      inverse_scale.cwiseProduct(BoxMinus(theta, rig.factory)(free));
-  const Eigen::VectorXd eta = U * known.asDiagonal() * U.transpose() *
-                              offset_by_theta.transpose() * from_factory;
-
+  // The data has its minimum at theta: eta is zero there.
   SegmentInformation about_theta;
   about_theta.theta0 = theta;
   const auto all = TangentSize(theta);
   about_theta.Lambda.setZero(all, all);
   about_theta.eta.setZero(all);
-  about_theta.Lambda(free, free) =
-      inverse_scale.asDiagonal() * Lambda * inverse_scale.asDiagonal();
-  about_theta.eta(free) = inverse_scale.cwiseProduct(eta);
+  about_theta.Lambda(free, free) = inverse_scale.asDiagonal() * U *
+                                   information.asDiagonal() * U.transpose() *
+                                   inverse_scale.asDiagonal();
   return Transport(about_theta, reference);
 }
 

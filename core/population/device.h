@@ -11,12 +11,11 @@
 namespace selfcal {
 
 // The information of the data of a device about the offset of its theta from
-// `reference`, without the prior of its rig: Lambda (theta [-] reference) =
-// eta.
-// `covariance` (D x D, tangent at theta) is that of the calibration `theta`,
-// which started from the prior PriorSigmas(rig) about rig.factory. Components
-// that the rig holds fixed have no information. `theta` and `reference` must
-// have the shape of rig.factory.
+// `reference`: Lambda (theta [-] reference) = eta. `covariance` (D x D, tangent
+// at theta) is that of a calibration run, which estimates without a prior and
+// leaves the variance of PriorSigmas(rig) to the directions that it holds
+// constant: these have no information here, like the components that the rig
+// holds fixed. `theta` and `reference` must have the shape of rig.factory.
 ThetaInformation DeviceInformation(const Rig& rig,
                                    const Calibration& theta,
                                    const Eigen::MatrixXd& covariance,

@@ -4,11 +4,11 @@
 
 #include <cmath>
 #include <random>
-#include <vector>
 
 #include "core/information/fusion.h"
 #include "core/population/consistency.h"
 #include "core/simulation/simulate.h"
+#include "test/core/population/run_estimate.h"
 
 namespace selfcal {
 namespace {
@@ -56,15 +56,15 @@ class PriorAgreementTest : public testing::Test {
     data.theta0 = rig_.factory;
     data.Lambda = J.transpose() * J;
     data.eta = J.transpose() * (J * offset + Normals(rows));
-    const FusedEstimate fused = Fuse(rig_, std::vector{data});
+    const RunEstimate run = EstimateAsARun(rig_, data);
     const Eigen::VectorXd error =
-        BoxMinus(fused.theta, BoxPlus(rig_.factory, offset));
+        BoxMinus(run.theta, BoxPlus(rig_.factory, offset));
     // In units of the prior: those of the components differ by orders.
     const Eigen::VectorXd scale = sigmas(free).cwiseInverse();
     const Eigen::MatrixXd covariance =
-        scale.asDiagonal() * fused.covariance(free, free) * scale.asDiagonal();
+        scale.asDiagonal() * run.covariance(free, free) * scale.asDiagonal();
     const Eigen::VectorXd e = scale.cwiseProduct(error(free));
-    return {CompareWithPrior(rig_, fused.theta, fused.covariance),
+    return {CompareWithPrior(rig_, run.theta, run.covariance),
             e.dot(covariance.llt().solve(e)) / static_cast<double>(e.size())};
   }
 
