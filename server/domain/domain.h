@@ -174,7 +174,7 @@ class Domain {
   // the active version or is the active one.
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
                                             bool force = false);
-  // Creates the runs that the rules about time start (age_trigger.h), of all
+  // Creates the runs that the rules about time start (time_triggers.h), of all
   // rigs that are to be checked (checks.h), at the steady time `now_ns`. Of
   // many, some wait for the next call (AreChecksDue).
   absl::StatusOr<std::vector<StoredRun>> StartTimedRuns(std::int64_t now_ns);

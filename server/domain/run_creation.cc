@@ -17,24 +17,6 @@
 namespace selfcal::server {
 namespace {
 
-const char* TriggerText(RunTrigger trigger) {
-  switch (trigger) {
-    case RunTrigger::kTablesFull:
-      return "the tables are full";
-    case RunTrigger::kTablesChanged:
-      return "the tables have changed";
-    case RunTrigger::kChangeDetected:
-      return "the tables are full again after a change";
-    case RunTrigger::kCalibrationAged:
-      return "the calibration is old";
-    case RunTrigger::kSessionEnded:
-      return "the session has ended, and the tables have changed";
-    case RunTrigger::kManual:
-      break;
-  }
-  return "requested by an operator";
-}
-
 // FAILED_PRECONDITION if a run on these tables would repeat the newest
 // successful run: the same segments, no device change since, and the active
 // version is the one that run started from or its result.
@@ -96,7 +78,7 @@ absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
 
 absl::StatusOr<StoredRun> CreateRun(UnitOfWork* tx,
                                     const std::vector<Table>& tables,
-                                    RunTrigger trigger) {
+                                    const RunReason& reason) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t unfinished, UnfinishedRun(tx));
   if (unfinished != 0) {
     return absl::FailedPreconditionError(fmt::format(
@@ -118,9 +100,7 @@ absl::StatusOr<StoredRun> CreateRun(UnitOfWork* tx,
   SELFCAL_ASSIGN_OR_RETURN(run.change, NewestChange(tx));
   run.rig = tx->rig();
   run.run = newest + 1;
-  run.trigger = trigger == RunTrigger::kTablesFull && run.change > 0
-                    ? RunTrigger::kChangeDetected
-                    : trigger;
+  run.trigger = reason.trigger;
   run.create_time_ns = tx->time_ns();
   run.create_steady_ns = tx->now().steady_ns;
   SELFCAL_RETURN_IF_ERROR(InsertRun(tx, run));
@@ -129,7 +109,7 @@ absl::StatusOr<StoredRun> CreateRun(UnitOfWork* tx,
                                       fmt::format("run {} on {} segments: {}",
                                                   run.run,
                                                   run.segments.size(),
-                                                  TriggerText(run.trigger))));
+                                                  reason.text)));
   return run;
 }
 
@@ -145,12 +125,15 @@ absl::StatusOr<std::optional<StoredRun>> CreateRunOfTables(
   if (trigger == Trigger::kNone) {
     return started;
   }
-  SELFCAL_ASSIGN_OR_RETURN(
-      started,
-      CreateRun(tx,
-                tables,
-                trigger == Trigger::kTablesFull ? RunTrigger::kTablesFull
-                                                : RunTrigger::kTablesChanged));
+  RunReason reason{RunTrigger::kTablesChanged, "the tables have changed"};
+  if (trigger == Trigger::kTablesFull) {
+    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change, NewestChange(tx));
+    reason = change > 0
+                 ? RunReason{RunTrigger::kChangeDetected,
+                             "the tables are full again after a change"}
+                 : RunReason{RunTrigger::kTablesFull, "the tables are full"};
+  }
+  SELFCAL_ASSIGN_OR_RETURN(started, CreateRun(tx, tables, reason));
   return started;
 }
 
@@ -161,7 +144,8 @@ absl::StatusOr<StoredRun> CreateManualRun(UnitOfWork* tx, bool force) {
   if (!force) {
     SELFCAL_RETURN_IF_ERROR(CheckThatTablesChanged(tx, tables));
   }
-  return CreateRun(tx, tables, RunTrigger::kManual);
+  return CreateRun(
+      tx, tables, {RunTrigger::kManual, "requested by an operator"});
 }
 
 }  // namespace selfcal::server

@@ -13,11 +13,16 @@
 
 namespace selfcal::server {
 
+struct RunReason {
+  RunTrigger trigger = RunTrigger::kManual;
+  const char* text = "";  // as the event of the run states it
+};
+
 // Creates a run on the present tables. FAILED_PRECONDITION if they are empty or
 // a run is unfinished.
 absl::StatusOr<StoredRun> CreateRun(UnitOfWork* tx,
                                     const std::vector<Table>& tables,
-                                    RunTrigger trigger);
+                                    const RunReason& reason);
 
 // Creates the run that the tables call for (EvaluateTrigger), if no run is
 // unfinished.

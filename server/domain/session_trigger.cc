@@ -57,8 +57,12 @@ absl::StatusOr<std::optional<StoredRun>> CreateSessionRun(UnitOfWork* tx) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
                            RemoveAgedEntries(tx, rig, tx->now().steady_ns));
   if (UnionOfTables(tables).empty()) return started;
-  SELFCAL_ASSIGN_OR_RETURN(started,
-                           CreateRun(tx, tables, RunTrigger::kSessionEnded));
+  SELFCAL_ASSIGN_OR_RETURN(
+      started,
+      CreateRun(tx,
+                tables,
+                {RunTrigger::kSessionEnded,
+                 "the session has ended, and the tables have changed"}));
   return started;
 }
 

@@ -23,24 +23,6 @@ v1::Recalibration::State EncodeRunState(RunState state) {
   return v1::Recalibration::STATE_UNSPECIFIED;
 }
 
-v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
-  switch (trigger) {
-    case RunTrigger::kTablesFull:
-      return v1::Recalibration::TABLES_FULL;
-    case RunTrigger::kTablesChanged:
-      return v1::Recalibration::TABLES_CHANGED;
-    case RunTrigger::kManual:
-      return v1::Recalibration::MANUAL;
-    case RunTrigger::kChangeDetected:
-      return v1::Recalibration::CHANGE_DETECTED;
-    case RunTrigger::kCalibrationAged:
-      return v1::Recalibration::CALIBRATION_AGED;
-    case RunTrigger::kSessionEnded:
-      return v1::Recalibration::SESSION_ENDED;
-  }
-  return v1::Recalibration::TRIGGER_UNSPECIFIED;
-}
-
 // Components that the rig holds fixed have no sigma and are skipped. The
 // message is a Recalibration or a ConvergenceStep.
 template <typename Message>
@@ -71,7 +53,7 @@ v1::Recalibration Encode(const StoredRun& run,
   message.set_name(
       ChildName(run.rig, "recalibrations", std::to_string(run.run)));
   message.set_state(EncodeRunState(run.state));
-  message.set_trigger(EncodeTrigger(run.trigger));
+  message.set_trigger(static_cast<v1::Recalibration::Trigger>(run.trigger));
   SetTime(run.create_time_ns, message.mutable_create_time());
   if (run.end_time_ns != 0) {
     SetTime(run.end_time_ns, message.mutable_end_time());

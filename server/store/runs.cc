@@ -59,20 +59,46 @@ absl::Status ReadSnapshots(Connection* db,
   return read.status();
 }
 
-// The trigger that the columns cause, change and session_ended encode.
-RunTrigger TriggerOf(std::int64_t cause,
-                     std::int64_t change,
-                     bool session_ended) {
-  switch (cause) {
+// How the columns cause and session_ended state a trigger. Those that were
+// there first share a cause. Any other one has its number in session_ended,
+// beside the cause of a manual run, for which a program from before it takes
+// the run.
+struct TriggerColumns {
+  std::int64_t cause = 0;
+  std::int64_t session_ended = 0;
+};
+
+TriggerColumns ColumnsOf(RunTrigger trigger) {
+  switch (trigger) {
+    case RunTrigger::kTablesFull:
+    case RunTrigger::kChangeDetected:
+      return {1, 0};
+    case RunTrigger::kTablesChanged:
+      return {2, 0};
+    case RunTrigger::kSessionEnded:
+      return {2, 1};
+    case RunTrigger::kManual:
+      return {3, 0};
+    case RunTrigger::kCalibrationAged:
+      return {4, 0};
+  }
+  return {3, static_cast<std::int64_t>(trigger)};
+}
+
+// `change` tells two triggers with the same columns apart.
+RunTrigger TriggerOf(const TriggerColumns& columns, std::int64_t change) {
+  switch (columns.cause) {
     case 1:
       return change > 0 ? RunTrigger::kChangeDetected : RunTrigger::kTablesFull;
     case 2:
-      return session_ended ? RunTrigger::kSessionEnded
-                           : RunTrigger::kTablesChanged;
+      return columns.session_ended != 0 ? RunTrigger::kSessionEnded
+                                        : RunTrigger::kTablesChanged;
     case 4:
       return RunTrigger::kCalibrationAged;
     default:
-      return RunTrigger::kManual;
+      return columns.session_ended != 0
+                 ? static_cast<RunTrigger>(columns.session_ended)
+                 : RunTrigger::kManual;
   }
 }
 
@@ -82,7 +108,7 @@ StoredRun RunFromRow(const Statement& row) {
   run.rig = row.Text(0);
   run.run = row.Int(1);
   run.state = static_cast<RunState>(row.Int(2));
-  run.trigger = TriggerOf(row.Int(3), row.Int(11), row.Int(12) != 0);
+  run.trigger = TriggerOf({row.Int(3), row.Int(12)}, row.Int(11));
   run.create_time_ns = row.Int(4);
   run.end_time_ns = row.Int(5);
   run.base_version = row.Int(6);
@@ -127,28 +153,6 @@ absl::StatusOr<std::vector<StoredRun>> ReadAll(Connection* db,
                                                Statement* read) {
   SELFCAL_ASSIGN_OR_RETURN(RunRows rows, ReadRows(read));
   return Complete(db, std::move(rows));
-}
-
-// The value of the column cause.
-int CauseOf(RunTrigger trigger) {
-  switch (trigger) {
-    case RunTrigger::kTablesFull:
-    case RunTrigger::kChangeDetected:
-      return 1;
-    case RunTrigger::kTablesChanged:
-    case RunTrigger::kSessionEnded:
-      return 2;
-    case RunTrigger::kCalibrationAged:
-      return 4;
-    case RunTrigger::kManual:
-      break;
-  }
-  return 3;
-}
-
-// The value of the column session_ended.
-int EndsSession(RunTrigger trigger) {
-  return trigger == RunTrigger::kSessionEnded ? 1 : 0;
 }
 
 absl::StatusOr<std::int64_t> NewestWhere(UnitOfWork* tx,
@@ -267,19 +271,20 @@ absl::StatusOr<std::int64_t> NewestRunOf(
     UnitOfWork* tx,
     std::initializer_list<RunTrigger> triggers,
     std::int64_t change) {
-  std::vector<std::string> columns;
+  std::vector<std::string> any;
   for (const RunTrigger trigger : triggers) {
-    columns.push_back(fmt::format("(cause = {} AND session_ended = {})",
-                                  CauseOf(trigger),
-                                  EndsSession(trigger)));
+    const TriggerColumns columns = ColumnsOf(trigger);
+    any.push_back(fmt::format("(cause = {} AND session_ended = {})",
+                              columns.cause,
+                              columns.session_ended));
   }
   return NewestWhere(
-      tx,
-      fmt::format("change = {} AND ({})", change, fmt::join(columns, " OR ")));
+      tx, fmt::format("change = {} AND ({})", change, fmt::join(any, " OR ")));
 }
 
 absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
   tx->Changed(RecordKind::kRun, run.run);
+  const TriggerColumns columns = ColumnsOf(run.trigger);
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
                 "INSERT INTO runs (rig, run, state, cause, create_time_ns, "
@@ -287,11 +292,11 @@ absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
                 "VALUES (?1, ?2, 1, ?3, ?4, ?5, ?6, ?7, ?8)",
                 tx->rig_row(),
                 run.run,
-                CauseOf(run.trigger),
+                columns.cause,
                 run.create_time_ns,
                 run.base_version,
                 run.change,
-                EndsSession(run.trigger),
+                columns.session_ended,
                 run.create_steady_ns)
           .Run());
   for (const SegmentKey& key : run.segments) {

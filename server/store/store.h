@@ -228,13 +228,15 @@ enum class RunState {
   kCancelled = 5,
 };
 
+// Why a run was created. The numbers are those of
+// selfcal.v1.Recalibration.Trigger and never change.
 enum class RunTrigger {
-  kTablesFull,
-  kTablesChanged,
-  kManual,
-  kChangeDetected,  // the tables are full for the first time since one
-  kCalibrationAged,
-  kSessionEnded,  // and a run is due (server/domain/session_trigger.h)
+  kTablesFull = 1,
+  kTablesChanged = 2,
+  kManual = 3,
+  kChangeDetected = 4,  // the tables are full for the first time since one
+  kCalibrationAged = 5,
+  kSessionEnded = 6,  // and a run is due (server/domain/session_trigger.h)
 };
 
 struct StoredRun {

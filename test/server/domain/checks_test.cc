@@ -5,8 +5,8 @@
 #include <map>
 #include <random>
 
-#include "server/domain/age_trigger.h"
 #include "server/domain/session_trigger.h"
+#include "server/domain/time_triggers.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_rows.h"
 #include "test/server/store/store_test.h"
@@ -71,7 +71,9 @@ class ChecksTest : public StoreTest {
         rig, [&](UnitOfWork* tx) -> absl::StatusOr<std::optional<StoredRun>> {
           const auto stored = ReadRig(tx);
           if (!stored.ok()) return stored.status();
-          return CreateAgedRun(tx, *stored, now_ns_);
+          const auto check = ApplyTimeTriggers(tx, *stored, now_ns_);
+          if (!check.ok()) return check.status();
+          return check->started;
         });
   }
 

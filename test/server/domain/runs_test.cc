@@ -1,3 +1,6 @@
+#include "server/store/runs.h"
+
+#include "server/store/transact.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -45,6 +48,31 @@ TEST_P(RunsTest, FullTablesStartOneRunWithTheirSnapshot) {
   ASSERT_EQ(unfinished->size(), 1u);
   EXPECT_EQ(unfinished->front().segments, started->segments);
   EXPECT_EQ(unfinished->front().state, RunState::kPending);
+}
+
+TEST_P(RunsTest, EveryTriggerIsKept) {
+  FullRig("a");
+  StoredRun last = store_->GetRun("a", 1).value();
+  // The last one is of a later program.
+  for (int number = 1; number <= 7; ++number) {
+    StoredRun run = last;
+    run.run = last.run + 1;
+    run.trigger = static_cast<RunTrigger>(number);
+    run.change = run.trigger == RunTrigger::kChangeDetected ? 1 : 0;
+    last.state = RunState::kCancelled;
+    const absl::Status written =
+        store_->Transact("a", 1, [&](UnitOfWork* tx) -> absl::Status {
+          const absl::Status ended = UpdateRun(tx, last);
+          return ended.ok() ? InsertRun(tx, run) : ended;
+        });
+    ASSERT_TRUE(written.ok()) << written;
+    EXPECT_EQ(store_->GetRun("a", run.run)->trigger, run.trigger) << number;
+    last = run;
+  }
+  const auto newest_manual = InspectFor(store_.get(), "a", [](UnitOfWork* tx) {
+    return NewestRunOf(tx, {RunTrigger::kManual}, 0);
+  });
+  EXPECT_EQ(newest_manual.value(), 4);
 }
 
 TEST_P(RunsTest, NoSecondRunWhileOneIsUnfinished) {

@@ -31,7 +31,7 @@ void ExpectNumbers(const std::vector<std::pair<Enum, int>>& expected) {
 }
 
 // Databases that exist hold these numbers.
-TEST(NumbersOnDisk, OfStatesNeverChange) {
+TEST(NumbersOnDisk, OfStatesAndTriggersNeverChange) {
   ExpectNumbers<SegmentState>({{SegmentState::kStored, 1},
                                {SegmentState::kScored, 2},
                                {SegmentState::kUnusable, 3}});
@@ -45,6 +45,12 @@ TEST(NumbersOnDisk, OfStatesNeverChange) {
                            {RunState::kSucceeded, 3},
                            {RunState::kFailed, 4},
                            {RunState::kCancelled, 5}});
+  ExpectNumbers<RunTrigger>({{RunTrigger::kTablesFull, 1},
+                             {RunTrigger::kTablesChanged, 2},
+                             {RunTrigger::kManual, 3},
+                             {RunTrigger::kChangeDetected, 4},
+                             {RunTrigger::kCalibrationAged, 5},
+                             {RunTrigger::kSessionEnded, 6}});
   ExpectNumbers<InstructionState>({{InstructionState::kPending, 1},
                                    {InstructionState::kDone, 2},
                                    {InstructionState::kRefused, 3}});
