@@ -51,14 +51,13 @@ absl::Status ChangeState(UnitOfWork* tx,
 // Makes a version the active one. `from` is its present state.
 absl::Status MakeActive(UnitOfWork* tx,
                         std::int64_t version,
-                        CalibrationState from,
-                        CalibrationState active_becomes) {
+                        CalibrationState from) {
   if (!MayBecome(from, CalibrationState::kActive)) {
     return Refusal(version, from, CalibrationState::kActive);
   }
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active, ActiveVersion(tx));
-  SELFCAL_RETURN_IF_ERROR(
-      ChangeState(tx, active, CalibrationState::kActive, active_becomes));
+  SELFCAL_RETURN_IF_ERROR(ChangeState(
+      tx, active, CalibrationState::kActive, StateOfReplaced(active, version)));
   SELFCAL_RETURN_IF_ERROR(
       ChangeState(tx, version, from, CalibrationState::kActive));
   return InsertActivation(tx, version);
@@ -76,6 +75,11 @@ bool MayBecome(CalibrationState from, CalibrationState to) {
       std::begin(kTransitions), std::end(kTransitions), [&](const auto& t) {
         return t.from == from && t.to == to;
       });
+}
+
+CalibrationState StateOfReplaced(std::int64_t active, std::int64_t version) {
+  return version < active ? CalibrationState::kRolledBack
+                          : CalibrationState::kSuperseded;
 }
 
 const char* StateName(CalibrationState state) {
@@ -117,10 +121,8 @@ absl::Status StoreFactoryCalibration(UnitOfWork* tx, const StoredRig& rig) {
 absl::Status EndValidation(UnitOfWork* tx, const StoredCalibration& validated) {
   SELFCAL_RETURN_IF_ERROR(InsertValidation(tx, validated));
   if (validated.state == CalibrationState::kActive) {
-    SELFCAL_RETURN_IF_ERROR(MakeActive(tx,
-                                       validated.version,
-                                       CalibrationState::kCandidate,
-                                       CalibrationState::kSuperseded));
+    SELFCAL_RETURN_IF_ERROR(
+        MakeActive(tx, validated.version, CalibrationState::kCandidate));
     return AppendPublished(tx, validated.version);
   }
   SELFCAL_RETURN_IF_ERROR(ChangeState(
@@ -150,11 +152,7 @@ absl::StatusOr<StoredCalibration> ActivateCalibration(
   }
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active, ActiveVersion(tx));
   const bool back = version < active;
-  SELFCAL_RETURN_IF_ERROR(MakeActive(
-      tx,
-      version,
-      chosen.state,
-      back ? CalibrationState::kRolledBack : CalibrationState::kSuperseded));
+  SELFCAL_RETURN_IF_ERROR(MakeActive(tx, version, chosen.state));
   SELFCAL_RETURN_IF_ERROR(
       AppendEvent(tx,
                   back ? EventKind::kCalibrationRolledBack

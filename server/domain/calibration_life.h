@@ -24,6 +24,9 @@ namespace selfcal::server {
 
 bool MayBecome(CalibrationState from, CalibrationState to);
 
+// What the active version becomes when `version` does.
+CalibrationState StateOfReplaced(std::int64_t active, std::int64_t version);
+
 // "rolled back".
 const char* StateName(CalibrationState state);
 

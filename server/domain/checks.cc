@@ -3,7 +3,7 @@
 #include "server/domain/session_trigger.h"
 #include "server/domain/time_triggers.h"
 #include "server/status/status_macros.h"
-#include "server/store/report.h"
+#include "server/store/reporting_device.h"
 #include "server/store/rig_checks.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_rows.h"

@@ -6,10 +6,12 @@
 #include <optional>
 
 #include "server/domain/alarms.h"
+#include "server/domain/calibration_life.h"
 #include "server/domain/quotas.h"
 #include "server/status/status_macros.h"
 #include "server/store/instructions.h"
 #include "server/store/report.h"
+#include "server/store/reporting_device.h"
 #include "server/store/rigs.h"
 
 namespace selfcal::server {
@@ -23,10 +25,11 @@ absl::Status Take(UnitOfWork* tx,
                   const DeviceReport& report,
                   std::int64_t newest,
                   const Quotas& quotas) {
+  const auto make_room = [&](std::int64_t bytes) {
+    return MakeRoomForReported(tx, bytes, quotas);
+  };
   SELFCAL_RETURN_IF_ERROR(
-      ApplyReport(tx, report.records, [&](std::int64_t bytes) {
-        return MakeRoomForReported(tx, bytes, quotas);
-      }));
+      ApplyReport(tx, report.records, {make_room, StateOfReplaced}));
   SELFCAL_RETURN_IF_ERROR(
       WriteReportingDevice(tx,
                            {.key = report.key,
@@ -41,8 +44,9 @@ absl::Status Take(UnitOfWork* tx,
 // Takes the last report of a rig, whatever was missed before.
 absl::StatusOr<ReportAnswer> TakeDeletion(UnitOfWork* tx,
                                           const DeviceReport& report) {
+  const auto no_room = [](std::int64_t) { return false; };
   SELFCAL_RETURN_IF_ERROR(
-      ApplyReport(tx, report.records, [](std::int64_t) { return false; }));
+      ApplyReport(tx, report.records, {no_room, StateOfReplaced}));
   SELFCAL_RETURN_IF_ERROR(DeleteRigRows(tx));
   return ReportAnswer();
 }

@@ -19,7 +19,7 @@
 #include "server/store/outbox.h"
 #include "server/store/payload.h"
 #include "server/store/replicas.h"
-#include "server/store/report.h"
+#include "server/store/reporting_device.h"
 #include "server/store/report_check.h"
 #include "server/store/rig_lists.h"
 #include "server/store/rig_work.h"

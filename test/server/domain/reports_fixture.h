@@ -12,7 +12,6 @@
 
 #include "selfcal/store/report.pb.h"
 #include "server/store/outbox.h"
-#include "server/store/report.h"
 #include "test/server/store/store_test.h"
 #include "test/server/test_records.h"
 

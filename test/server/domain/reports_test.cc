@@ -8,7 +8,6 @@
 #include "server/store/checksum.h"
 #include "server/store/outbox.h"
 #include "server/store/records.h"
-#include "server/store/report.h"
 #include "test/promise.h"
 #include "test/server/domain/reports_fixture.h"
 

@@ -8,7 +8,7 @@
 #include "server/pipeline/verdict.h"
 #include "server/pipeline/verification_sampler.h"
 #include "server/pipeline/verifier.h"
-#include "server/store/report.h"
+#include "server/store/reporting_device.h"
 #include "test/server/pipeline/fake_conditions.h"
 #include "test/server/pipeline/pipeline_test.h"
 

@@ -4,7 +4,7 @@
 #include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/store_service.pb.h"
 #include "server/store/events.h"
-#include "server/store/report.h"
+#include "server/store/reporting_device.h"
 #include "test/server/uplink/uplink_fixture.h"
 
 namespace selfcal::server {
