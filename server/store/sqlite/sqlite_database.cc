@@ -1,9 +1,8 @@
 #include "server/store/sqlite/sqlite_database.h"
 
-#include <algorithm>
 #include <future>
-#include <iterator>
 #include <utility>
+#include <vector>
 
 #include "server/status/status_macros.h"
 #include "server/store/driver/statement.h"
@@ -15,11 +14,6 @@ namespace {
 
 // Bounds how long the first write of a group waits for the last.
 constexpr std::size_t kMaxGroup = 64;
-
-// The log is moved into the file when it is this large: several groups of
-// segments, so that a page that many of them change is written once.
-constexpr std::int64_t kCheckpointBytes = 32 << 20;
-constexpr std::int64_t kLeastPage = 512;  // the smallest of SQLite
 
 // True if the disk failed, rather than the write or the query.
 bool IsDiskError(const absl::Status& status) {
@@ -51,16 +45,10 @@ absl::Status QuickCheck(SqliteConnection* connection) {
       words + ")");
 }
 
-// Replaces SQLite's automatic checkpoint, which is part of a commit.
-int NoteLogPages(void* log_pages, sqlite3*, const char*, int pages) {
-  *static_cast<int*>(log_pages) = pages;
-  return SQLITE_OK;
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::Open(
-    const std::string& path, Opener open_writer) {
+    const std::string& path, SqliteWriter::Opener open_writer) {
   std::unique_ptr<SqliteDatabase> database(
       new SqliteDatabase(path, std::move(open_writer)));
   SELFCAL_RETURN_IF_ERROR(database->OpenConnections());
@@ -68,57 +56,37 @@ absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::Open(
   return database;
 }
 
-SqliteDatabase::SqliteDatabase(std::string path, Opener open_writer)
+SqliteDatabase::SqliteDatabase(std::string path,
+                               SqliteWriter::Opener open_writer)
     : path_(std::move(path)),
-      open_writer_(std::move(open_writer)),
-      copies_(MakeSqliteCopies(path_)) {}
+      copies_(MakeSqliteCopies(path_)),
+      writer_(path_, std::move(open_writer)) {}
 
 SqliteDatabase::~SqliteDatabase() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  arrived_.notify_all();
+  queue_.Stop();
   if (thread_.joinable()) thread_.join();
   // The writer closes last: closing it moves the log into the file.
   reader_.reset();
-  writer_.reset();
+  writer_.Close();
 }
 
 absl::Status SqliteDatabase::OpenConnections() {
   const std::lock_guard lock(read_mutex_);
   reader_.reset();
-  writer_.reset();
-  SELFCAL_ASSIGN_OR_RETURN(writer_, open_writer_());
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t page_bytes,
-                           ReadInt(writer_.get(), "PRAGMA page_size"));
-  checkpoint_pages_ = kCheckpointBytes / std::max(page_bytes, kLeastPage);
-  SELFCAL_ASSIGN_OR_RETURN(file_, IdentityOf(path_));
-  log_.reset();
-  log_pages_ = 0;
-  sqlite3_wal_hook(writer_->handle(), NoteLogPages, &log_pages_);
+  SELFCAL_RETURN_IF_ERROR(writer_.Open());
   SELFCAL_ASSIGN_OR_RETURN(reader_, SqliteConnection::OpenReader(path_));
   return absl::OkStatus();
 }
 
 absl::Status SqliteDatabase::Recover() {
   SELFCAL_RETURN_IF_ERROR(OpenConnections());
-  SELFCAL_RETURN_IF_ERROR(QuickCheck(writer_.get()));
-  Statement checkpoint(writer_.get(), "PRAGMA wal_checkpoint(TRUNCATE)");
+  SELFCAL_RETURN_IF_ERROR(QuickCheck(writer_.connection()));
+  Statement checkpoint(writer_.connection(), "PRAGMA wal_checkpoint(TRUNCATE)");
   const bool found = checkpoint.Next();
   SELFCAL_RETURN_IF_ERROR(checkpoint.status());
   if (!found || checkpoint.Int(0) != 0) return Checking();
   failed_ = false;
   return absl::OkStatus();
-}
-
-void SqliteDatabase::CheckpointIfLarge() {
-  if (failed_ || log_pages_ < checkpoint_pages_) return;
-  log_pages_ = 0;  // until the next commit
-  // As far as readers allow; the rest next time.
-  const int code = sqlite3_wal_checkpoint_v2(
-      writer_->handle(), nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
-  if (code != SQLITE_BUSY) Failed(writer_->StatusOf(code, "checkpoint"));
 }
 
 void SqliteDatabase::Failed(const absl::Status& status) {
@@ -143,21 +111,12 @@ absl::Status SqliteDatabase::Read(const Work& query) {
 // Makes the writing thread reopen the database, without waiting for it: that
 // thread could be waiting for a reader.
 void SqliteDatabase::WakeToRecover() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!queue_.empty()) return;
-    queue_.push_back({[](Connection*) { return absl::OkStatus(); },
+  queue_.PushIfEmpty({[](Connection*) { return absl::OkStatus(); },
                       [](const absl::Status&) {}});
-  }
-  arrived_.notify_all();
 }
 
 void SqliteDatabase::BeginWrite(Work work, Done done) {
-  {
-    const std::lock_guard lock(mutex_);
-    queue_.push_back({std::move(work), std::move(done)});
-  }
-  arrived_.notify_all();
+  queue_.Push({std::move(work), std::move(done)});
 }
 
 absl::Status SqliteDatabase::Write(Work work) {
@@ -176,78 +135,64 @@ absl::StatusOr<std::unique_ptr<Connection>> SqliteDatabase::OpenReader() {
 }
 
 void SqliteDatabase::Run() {
-  std::unique_lock lock(mutex_);
   for (;;) {
-    arrived_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
-    if (queue_.empty()) return;
-    const auto end = std::next(
-        queue_.begin(),
-        static_cast<std::ptrdiff_t>(std::min(queue_.size(), kMaxGroup)));
-    std::vector<Job> group(std::make_move_iterator(queue_.begin()),
-                           std::make_move_iterator(end));
-    queue_.erase(queue_.begin(), end);
-    lock.unlock();
+    std::vector<QueuedWrite> group = queue_.Take(kMaxGroup);
+    if (group.empty()) return;
     Commit(group);
-    for (const Job& job : group) job.done(job.status);
-    group.clear();  // releases their memory before taking the lock
-    CheckpointIfLarge();
-    lock.lock();
+    for (const QueuedWrite& write : group) write.done(write.status);
+    group.clear();  // releases their memory before the checkpoint
+    if (!failed_) Failed(writer_.CheckpointIfLarge());
   }
 }
 
-// After a commit, and before it is answered: whether it is in the files that a
-// restart will find.
 absl::Status SqliteDatabase::CheckInPlace() {
-  const std::string log = path_ + "-wal";
-  if (!log_) {
-    const auto first = IdentityOf(log);
-    if (first.ok()) log_ = *first;
-  }
-  moved_ = !StillNames(path_, file_) || !log_ || !StillNames(log, *log_);
+  moved_ = !writer_.IsInPlace();
   return moved_ ? Moved(path_) : absl::OkStatus();
 }
 
-void SqliteDatabase::Commit(std::span<Job> group) {
+void SqliteDatabase::Commit(std::span<QueuedWrite> group) {
   if (moved_) {
-    for (Job& job : group) job.status = Moved(path_);
+    for (QueuedWrite& write : group) write.status = Moved(path_);
     return;
   }
   if (failed_) {
     const absl::Status recovered = Recover();
     if (!recovered.ok()) {
       failed_ = true;
-      for (Job& job : group) job.status = recovered;
+      for (QueuedWrite& write : group) write.status = recovered;
       return;
     }
   }
   if (CommitTogether(group) || group.size() == 1) return;
   // One of them may have been too large for an almost full disk: try each
   // alone.
-  for (Job& job : group) {
+  for (QueuedWrite& write : group) {
     if (failed_) {
-      job.status = Checking();
+      write.status = Checking();
     } else {
-      CommitTogether({&job, 1});
+      CommitTogether({&write, 1});
     }
   }
 }
 
 // False if nothing was committed and each write deserves a try of its own; true
 // if the statuses are final.
-bool SqliteDatabase::CommitTogether(std::span<Job> group) {
+bool SqliteDatabase::CommitTogether(std::span<QueuedWrite> group) {
   const auto fail = [&](const absl::Status& status) {
     Failed(status);
-    for (Job& job : group) job.status = status;
+    for (QueuedWrite& write : group) write.status = status;
     return IsDiskError(status);
   };
-  Transaction transaction(writer_.get());
+  SqliteConnection* const db = writer_.connection();
+  Transaction transaction(db);
   if (!transaction.status().ok()) return fail(transaction.status());
-  for (Job& job : group) {
-    job.status = RunGuarded(job.work, writer_.get());
-    if (IsDiskError(job.status) || !writer_->in_transaction()) {
+  for (QueuedWrite& write : group) {
+    write.status = RunGuarded(write.work, db);
+    if (IsDiskError(write.status) || !db->in_transaction()) {
       const absl::Status lost =
-          job.status.ok() ? absl::InternalError("a write ended the transaction")
-                          : job.status;
+          write.status.ok()
+              ? absl::InternalError("a write ended the transaction")
+              : write.status;
       return fail(lost);
     }
   }
@@ -255,7 +200,7 @@ bool SqliteDatabase::CommitTogether(std::span<Job> group) {
   if (!committed.ok()) return fail(committed);
   ++commits_;
   const absl::Status in_place = CheckInPlace();
-  for (Job& job : group) job.status.Update(in_place);
+  for (QueuedWrite& write : group) write.status.Update(in_place);
   return true;
 }
 

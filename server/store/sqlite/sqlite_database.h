@@ -26,32 +26,25 @@
 #include <absl/status/statusor.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
-#include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <span>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "server/store/driver/driver.h"
-#include "server/store/sqlite/file_identity.h"
 #include "server/store/sqlite/sqlite_connection.h"
+#include "server/store/sqlite/sqlite_writer.h"
+#include "server/store/sqlite/write_queue.h"
 
 namespace selfcal::server {
 
 class SqliteDatabase final : public Database {
  public:
-  using Opener =
-      std::function<absl::StatusOr<std::unique_ptr<SqliteConnection>>()>;
-
   // `open_writer` is called first and creates or migrates the file at `path`.
   static absl::StatusOr<std::unique_ptr<SqliteDatabase>> Open(
-      const std::string& path, Opener open_writer);
+      const std::string& path, SqliteWriter::Opener open_writer);
   // Carries out the queued writes.
   ~SqliteDatabase() override;
   SqliteDatabase(const SqliteDatabase&) = delete;
@@ -68,42 +61,25 @@ class SqliteDatabase final : public Database {
   std::int64_t commits() const { return commits_; }
 
  private:
-  struct Job {
-    Work work;
-    Done done;
-    absl::Status status = absl::OkStatus();
-  };
-
-  SqliteDatabase(std::string path, Opener open_writer);
+  SqliteDatabase(std::string path, SqliteWriter::Opener open_writer);
   absl::Status OpenConnections();
   absl::Status Recover();
   void Run();
-  void Commit(std::span<Job> group);
-  bool CommitTogether(std::span<Job> group);
+  void Commit(std::span<QueuedWrite> group);
+  bool CommitTogether(std::span<QueuedWrite> group);
   absl::Status CheckInPlace();
-  void CheckpointIfLarge();
   void Failed(const absl::Status& status);
   void WakeToRecover();
 
   const std::string path_;
-  const Opener open_writer_;
   const std::unique_ptr<DatabaseCopies> copies_;
-  // Used by the thread alone once it runs.
-  std::unique_ptr<SqliteConnection> writer_;
-  FileIdentity file_;
-  std::optional<FileIdentity> log_;  // of the file, since the first commit
-  int log_pages_ = 0;                // after the last commit
-  std::int64_t checkpoint_pages_ = 0;
+  SqliteWriter writer_;  // used by the thread alone once it runs
   std::mutex read_mutex_;
   std::unique_ptr<SqliteConnection> reader_;  // guarded by read_mutex_
   std::atomic<bool> failed_ = false;          // disk error: to be reopened
   std::atomic<bool> moved_ = false;           // the files are not in place
   std::atomic<std::int64_t> commits_ = 0;
-
-  std::mutex mutex_;  // guards what follows
-  std::condition_variable arrived_;
-  std::deque<Job> queue_;
-  bool stopping_ = false;
+  WriteQueue queue_;
   std::thread thread_;
 };
 
