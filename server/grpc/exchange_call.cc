@@ -1,5 +1,4 @@
 #include <condition_variable>
-#include <deque>
 #include <memory>
 #include <mutex>
 #include <system_error>
@@ -8,6 +7,7 @@
 #include <variant>
 
 #include "server/api/errors.h"
+#include "server/grpc/answer_queue.h"
 #include "server/grpc/bytes.h"
 #include "server/grpc/caller.h"
 #include "server/grpc/calls.h"
@@ -37,8 +37,7 @@ class ExchangeCall final : public Reactor {
 
   void OnReadDone(bool ok) override {
     const std::lock_guard lock(mutex_);
-    reading_ = false;
-    (ok ? arrived_ : closed_) = true;
+    reading_ = ok ? Reading::kArrived : Reading::kClosed;
     changed_.notify_all();
   }
 
@@ -46,8 +45,7 @@ class ExchangeCall final : public Reactor {
     const grpc::ByteBuffer* next = nullptr;
     {
       const std::lock_guard lock(mutex_);
-      writing_ = false;
-      answers_.pop_front();
+      answers_.EndWrite();
       if (!ok) gone_ = true;
       next = NextToWrite();
       changed_.notify_all();
@@ -67,43 +65,50 @@ class ExchangeCall final : public Reactor {
   }
 
  private:
-  struct Slot {
-    bool filled = false;
-    MemoryPool::Share work;  // until it is filled
-    absl::Status status;
-    grpc::ByteBuffer response;
+  enum class Reading {
+    kIdle,
+    kInProgress,
+    kArrived,  // a request was read and not yet taken
+    kClosed,   // the caller sends no more
+  };
+
+  // The request that is read, and the reservation for it.
+  struct Incoming {
+    grpc::ByteBuffer bytes;
+    ReadGate::Admission admission;
+    std::int64_t last_bytes = 0;  // size of the last request
   };
 
   void Run() {
     std::unique_lock lock(mutex_);
     while (!Over()) {
-      if (arrived_ && !Ending()) {
-        arrived_ = false;
-        Slot* slot = answers_.emplace_back(std::make_unique<Slot>()).get();
+      if (reading_ == Reading::kArrived && !Ending()) {
+        reading_ = Reading::kIdle;
+        AnswerQueue::Answer* const answer = answers_.Add();
         lock.unlock();
-        Take(slot);
+        Take(answer);
         lock.lock();
-      } else if (!reading_ && !closed_ && !Ending() &&
+      } else if (reading_ == Reading::kIdle && !Ending() &&
                  answers_.size() < kReadAhead) {
         lock.unlock();
-        auto admitted =
-            context_.reads->Enter(last_bytes_, [this] { return !Goes(); });
+        auto admitted = context_.reads->Enter(incoming_.last_bytes,
+                                              [this] { return !Goes(); });
         lock.lock();
         if (!admitted) continue;
-        admitted_ = *std::move(admitted);
-        reading_ = true;
+        incoming_.admission = *std::move(admitted);
+        reading_ = Reading::kInProgress;
         lock.unlock();
-        StartRead(&bytes_);
+        StartRead(&incoming_.bytes);
         lock.lock();
-      } else if (!admitted_.held()) {
+      } else if (!incoming_.admission.held()) {
         changed_.wait(lock);
       } else if (changed_.wait_for(lock, ReadGate::kLook) ==
                      std::cv_status::timeout &&
-                 !arrived_) {
-        admitted_.Look();
+                 reading_ != Reading::kArrived) {
+        incoming_.admission.Look();
       }
     }
-    const grpc::Status status = failed_        ? ToGrpc(failure_)
+    const grpc::Status status = Failed()       ? ToGrpc(answers_.error())
                                 : gone_.load() ? grpc::Status::CANCELLED
                                                : grpc::Status::OK;
     lock.unlock();
@@ -113,48 +118,46 @@ class ExchangeCall final : public Reactor {
   // True if every request in progress has an answer and nothing else is left to
   // do. With the lock held, as for all that follow except Take.
   bool Over() const {
-    if (writing_ || (arrived_ && !Ending())) return false;
-    for (const auto& slot : answers_) {
-      if (!slot->filled || !Ending()) return false;
-    }
-    return Ending() || closed_;
+    if (answers_.writing()) return false;
+    if (Ending()) return answers_.AllFilled();
+    return reading_ == Reading::kClosed && answers_.size() == 0;
   }
 
-  bool Ending() const { return failed_ || gone_; }
+  bool Failed() const { return !answers_.error().ok(); }
+  bool Ending() const { return Failed() || gone_; }
 
   bool Goes() {
     const std::lock_guard lock(mutex_);
     return !Ending();
   }
 
-  void Take(Slot* slot) {
-    last_bytes_ = static_cast<std::int64_t>(bytes_.Length());
+  void Take(AnswerQueue::Answer* answer) {
+    incoming_.last_bytes = static_cast<std::int64_t>(incoming_.bytes.Length());
     const std::unique_ptr<Message> request(method_.request->New());
     auto work = TakeRequest(
-        context_, bytes_, [this] { return !Goes(); }, request.get());
-    bytes_.Clear();
-    admitted_.End();
-    if (!work.ok()) return Fill(slot, work.status(), *method_.response);
-    slot->work = *std::move(work);
+        context_, incoming_.bytes, [this] { return !Goes(); }, request.get());
+    incoming_.bytes.Clear();
+    incoming_.admission.End();
+    if (!work.ok()) return Fill(answer, work.status(), *method_.response);
+    answer->work = *std::move(work);
     exchange_->Take(
         *request,
-        [this, slot](const absl::Status& status, const Message& response) {
-          Fill(slot, status, response);
+        [this, answer](const absl::Status& status, const Message& response) {
+          Fill(answer, status, response);
         });
   }
 
   // Once the lock is released the call may be over and deleted, unless a write
   // was begun.
-  void Fill(Slot* slot, const absl::Status& status, const Message& response) {
+  void Fill(AnswerQueue::Answer* answer,
+            const absl::Status& status,
+            const Message& response) {
     grpc::ByteBuffer bytes;
     if (status.ok()) bytes = Serialise(response);
     const grpc::ByteBuffer* next = nullptr;
     {
       const std::lock_guard lock(mutex_);
-      slot->status = status;
-      slot->response.Swap(&bytes);
-      slot->filled = true;
-      slot->work.Shrink(0);
+      answer->Fill(status, &bytes);
       next = NextToWrite();
       changed_.notify_all();
     }
@@ -162,16 +165,7 @@ class ExchangeCall final : public Reactor {
   }
 
   const grpc::ByteBuffer* NextToWrite() {
-    if (writing_ || Ending() || answers_.empty()) return nullptr;
-    const Slot& first = *answers_.front();
-    if (!first.filled) return nullptr;
-    if (!first.status.ok()) {
-      failed_ = true;
-      failure_ = first.status;
-      return nullptr;
-    }
-    writing_ = true;
-    return &first.response;
+    return Ending() ? nullptr : answers_.BeginWrite();
   }
 
   const CallContext context_;
@@ -179,19 +173,12 @@ class ExchangeCall final : public Reactor {
   std::atomic<bool> gone_ = false;  // the caller has disconnected
   const Call call_;
   const std::unique_ptr<Exchange> exchange_;  // of the thread
-  grpc::ByteBuffer bytes_;                    // being read
-  ReadGate::Admission admitted_;              // for it; of the thread
-  std::int64_t last_bytes_ = 0;  // of the last request; of the thread
+  Incoming incoming_;  // of the thread; gRPC fills the bytes during a read
 
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
-  std::deque<std::unique_ptr<Slot>> answers_;  // in the order of the requests
-  bool reading_ = false;
-  bool arrived_ = false;  // a request was read and not yet taken
-  bool closed_ = false;   // the caller sends no more
-  bool writing_ = false;
-  bool failed_ = false;  // ends with `failure_`
-  absl::Status failure_;
+  Reading reading_ = Reading::kIdle;
+  AnswerQueue answers_;
 };
 
 class Refusal final : public Reactor {
