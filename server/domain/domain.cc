@@ -446,8 +446,8 @@ absl::StatusOr<ReportAnswer> Domain::TakeReport(const DeviceReport& report) {
   const Moment now = clock_();
   // Before it is looked for, so that no first report slips in between.
   if (report.deleted) {
-    SELFCAL_RETURN_IF_ERROR(
-        store_->EndReports(report.key, report.attempt, now.time_ns));
+    SELFCAL_RETURN_IF_ERROR(store_->EndReports(
+        report.key, report.attempt, now.time_ns, kEndOfReportsKept_ns));
   }
   const auto taken = Change(store_, report.rig, now, [&](UnitOfWork* tx) {
     return server::TakeReport(tx, report, options_.quotas);

@@ -16,6 +16,11 @@
 
 namespace selfcal::server {
 
+// Retention of the deletion of a rig by its device: longer than any report is
+// on its way.
+inline constexpr std::int64_t kEndOfReportsKept_ns =
+    std::int64_t{7} * 24 * 3600 * 1'000'000'000;
+
 // A report as it arrived.
 struct DeviceReport {
   std::string rig = {};

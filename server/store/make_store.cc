@@ -323,9 +323,10 @@ class DatabaseStore final : public Store {
 
   absl::Status EndReports(std::int64_t key,
                           std::int64_t attempt,
-                          std::int64_t now_ns) override {
+                          std::int64_t now_ns,
+                          std::int64_t kept_ns) override {
     return WriteInTransaction(db_.get(), [&](Connection* db) {
-      return WriteEndOfReports(db, key, attempt, now_ns);
+      return WriteEndOfReports(db, key, attempt, now_ns, kept_ns);
     });
   }
 

@@ -90,11 +90,12 @@ absl::Status ForgetEndOfReports(UnitOfWork* tx, std::int64_t key) {
 absl::Status WriteEndOfReports(Connection* db,
                                std::int64_t key,
                                std::int64_t attempt,
-                               std::int64_t now_ns) {
+                               std::int64_t now_ns,
+                               std::int64_t kept_ns) {
   SELFCAL_RETURN_IF_ERROR(Statement(db,
                                     "DELETE FROM ended_reports "
                                     "WHERE time_ns < ?1",
-                                    now_ns - kEndOfReportsKept_ns)
+                                    now_ns - kept_ns)
                               .Run());
   return PutEndOfReports(db, key, attempt, now_ns).status();
 }

@@ -47,15 +47,11 @@ absl::Status ForgetEndOfReports(UnitOfWork* tx, std::int64_t key);
 
 // --- Without a rig.
 
-// The deletion of a rig by its device is remembered for longer than any report
-// is on its way.
-inline constexpr std::int64_t kEndOfReportsKept_ns =
-    std::int64_t{7} * 24 * 3600 * 1'000'000'000;
-// Store::EndReports. The newest attempt stays; what is older than
-// kEndOfReportsKept_ns is removed.
+// Store::EndReports. The newest attempt stays.
 absl::Status WriteEndOfReports(Connection* db,
                                std::int64_t key,
                                std::int64_t attempt,
-                               std::int64_t now_ns);
+                               std::int64_t now_ns,
+                               std::int64_t kept_ns);
 
 }  // namespace selfcal::server

@@ -531,10 +531,11 @@ class Store {
   // The device has deleted the rig with this key in its database, as reported
   // in this attempt; the first report of the rig by an older attempt that
   // arrives later is ignored (ReadEndOfReports). Waits for those that are being
-  // taken.
+  // taken. Forgets deletions that are older than `kept_ns`.
   virtual absl::Status EndReports(std::int64_t key,
                                   std::int64_t attempt,
-                                  std::int64_t now_ns) = 0;
+                                  std::int64_t now_ns,
+                                  std::int64_t kept_ns) = 0;
 
   // --- The clock of the device, of which there is one record.
   // nullopt before the first is written.

@@ -337,7 +337,8 @@ TEST_P(ReportsTest, DeletionIsForgottenWhenNoReportCanBeOnItsWay) {
     ASSERT_TRUE(store_
                     ->EndReports(first.key + days,
                                  1,
-                                 NowNs() + days * 24 * 3600 * 1'000'000'000)
+                                 NowNs() + days * 24 * 3600 * 1'000'000'000,
+                                 kEndOfReportsKept_ns)
                     .ok());
     const auto late = Give(first);
     ASSERT_TRUE(late.ok()) << late.status();
