@@ -127,7 +127,7 @@ struct RunRows {
   std::vector<RunKey> keys;
 };
 
-absl::StatusOr<RunRows> ReadRows(Statement* read) {
+absl::StatusOr<RunRows> ReadRunRows(Statement* read) {
   RunRows rows;
   while (read->Next()) {
     rows.runs.push_back(RunFromRow(*read));
@@ -151,7 +151,7 @@ absl::StatusOr<std::vector<StoredRun>> Complete(Connection* db, RunRows rows) {
 
 absl::StatusOr<std::vector<StoredRun>> ReadAll(Connection* db,
                                                Statement* read) {
-  SELFCAL_ASSIGN_OR_RETURN(RunRows rows, ReadRows(read));
+  SELFCAL_ASSIGN_OR_RETURN(RunRows rows, ReadRunRows(read));
   return Complete(db, std::move(rows));
 }
 
@@ -184,7 +184,7 @@ absl::StatusOr<Listed<StoredRun>> ListRunsOfMany(Connection* db,
                  place.number,
                  size + 1);
   condition.Bind(&read);
-  SELFCAL_ASSIGN_OR_RETURN(RunRows rows, ReadRows(&read));
+  SELFCAL_ASSIGN_OR_RETURN(RunRows rows, ReadRunRows(&read));
   Listed<StoredRun> listed;
   if (static_cast<int>(rows.runs.size()) > size) {
     rows.runs.pop_back();
