@@ -44,6 +44,7 @@ class Target:
     name: str
     folder: str
     is_library: bool = True
+    is_module: bool = False  # declared by selfcal_module
     sources: set = dataclasses.field(default_factory=set)
     uses: set = dataclasses.field(default_factory=set)
     private_uses: set = dataclasses.field(default_factory=set)
@@ -98,7 +99,7 @@ class Project:
             self.by_folder[target.folder].append(target)
             for source in target.sources:
                 self.by_source[source].append(target)
-        self._closures: dict = {}
+        self._passed_on: dict = {}
 
     def _target(self, name: str, folder: str) -> Target:
         return self.targets.setdefault(name, Target(name, folder))
@@ -132,6 +133,7 @@ class Project:
             if name in _DECLARATIONS:
                 target = self._target(first[0], folder)
                 target.is_library = name != "selfcal_test"
+                target.is_module = name == "selfcal_module"
                 target.sources |= paths(parts["SOURCES"] + parts["LANES"])
                 target.uses |= set(parts["USES"])
                 target.private_uses |= set(parts["PRIVATE_USES"])
@@ -187,20 +189,23 @@ class Project:
             return {self.generated[header]}
         return {t.name for t in self.owners(header) if t.is_library}
 
+    def passed_on(self, name: str) -> set:
+        """The targets whose headers one gives its users, itself among them."""
+        if name not in self._passed_on:
+            seen, waiting = set(), [name]
+            while waiting:
+                used = waiting.pop()
+                if used not in seen:
+                    seen.add(used)
+                    if used in self.targets:
+                        waiting += self.targets[used].uses
+            self._passed_on[name] = seen
+        return self._passed_on[name]
+
     def reachable(self, target: Target) -> set:
         """The targets whose headers a target may include, itself among them."""
-        if target.name not in self._closures:
-            seen = {target.name}
-            waiting = [*target.uses, *target.private_uses]
-            while waiting:
-                name = waiting.pop()
-                if name in seen:
-                    continue
-                seen.add(name)
-                if name in self.targets:
-                    waiting += self.targets[name].uses
-            self._closures[target.name] = seen
-        return self._closures[target.name]
+        direct = target.uses | target.private_uses
+        return {target.name}.union(*(self.passed_on(name) for name in direct))
 
 
 def undeclared_includes(project: Project) -> list:
