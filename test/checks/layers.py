@@ -36,7 +36,7 @@ _KEYWORDS = {
     "LABELS", "TIMEOUT", "NOT_SANITIZED", "PUBLIC", "PRIVATE", "INTERFACE",
     "TARGET", "LANGUAGE", "GENERATE_EXTENSIONS", "PLUGIN", "PROTOC_OUT_DIR",
 }  # fmt: skip
-_INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"')
+_INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^">]+)[">]')
 
 
 @dataclasses.dataclass

@@ -60,6 +60,12 @@ class LayersTest(unittest.TestCase):
             "core/low/CMakeLists.txt",
         )
 
+    def test_an_include_in_angle_brackets_is_checked_as_well(self):
+        self.expect_one(
+            {"core/low/low.cc": "#include<core/mid/mid.h>\n"},
+            "core/low/low.cc:1: ",
+        )
+
     def test_the_include_of_a_header_is_checked_as_well(self):
         self.expect_one(
             {"core/low/low.h": '#include "core/mid/mid.h"\n'},
