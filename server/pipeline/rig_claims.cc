@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/pipeline/backoff.h"
 #include "server/status/status_macros.h"
+#include "server/store/replicas.h"
 
 namespace selfcal::server {
 namespace {
@@ -20,8 +20,6 @@ namespace {
 constexpr int kRigsAtATime = 8;
 constexpr std::chrono::milliseconds kPause{20};
 constexpr std::chrono::milliseconds kPauseForEach{10};
-// A rig without work stays claimed for so long: its device sends more.
-constexpr std::chrono::seconds kKeep{5};
 // The database is away if it has not responded for so many beats.
 constexpr int kBeatsToRespond = 5;
 
@@ -36,49 +34,41 @@ std::string NewName() {
 RigClaims::RigClaims(Store* store,
                      const ReplicaOptions& options,
                      std::function<void()> on_beat)
-    : store_(store), options_(options), on_beat_(std::move(on_beat)) {}
+    : store_(store),
+      options_(options),
+      on_beat_(std::move(on_beat)),
+      others_(options),
+      thread_(kPause) {}
 
 RigClaims::~RigClaims() { Stop(); }
 
 absl::Status RigClaims::Start() {
   if (!options_.shared) return absl::OkStatus();
   SELFCAL_RETURN_IF_ERROR(Begin());
-  const std::lock_guard lock(mutex_);
-  running_ = true;
-  thread_ = std::thread([this] { Run(); });
+  thread_.Start([this, backoff = Backoff()]() mutable {
+    return PassOrBackOff(&backoff);
+  });
   return absl::OkStatus();
 }
 
 void RigClaims::Stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    running_ = false;
-  }
-  changed_.notify_all();
-  if (!thread_.joinable()) return;
-  thread_.join();
+  thread_.Stop();
+  const std::string name = replica();
+  if (name.empty()) return;
   // Its claims are free once its record is gone.
-  const absl::Status removed = store_->replicas()->Remove(replica_);
+  const absl::Status removed = store_->replicas()->Remove(name);
   if (!removed.ok()) {
     spdlog::warn("others wait for the claims of this daemon to expire: {}",
                  removed.ToString());
   }
-  const std::lock_guard lock(mutex_);
-  replica_.clear();
-  held_.clear();
+  held_.Reset("");
 }
 
-std::string RigClaims::replica() const {
-  const std::lock_guard lock(mutex_);
-  return replica_;
-}
+std::string RigClaims::replica() const { return held_.replica(); }
 
 std::optional<RigClaim> RigClaims::Find(const std::string& rig) const {
   if (!options_.shared) return RigClaim(rig);
-  const std::lock_guard lock(mutex_);
-  const auto held = held_.find(rig);
-  if (held == held_.end()) return std::nullopt;
-  return held->second.claim;
+  return held_.Find(rig);
 }
 
 bool RigClaims::Holds(const RigClaim& claim) const {
@@ -91,13 +81,7 @@ bool RigClaims::IsFirst() const {
   return is_first_;
 }
 
-void RigClaims::Wake() {
-  {
-    const std::lock_guard lock(mutex_);
-    woken_ = true;
-  }
-  changed_.notify_all();
-}
+void RigClaims::Wake() { thread_.Wake(); }
 
 bool RigClaims::Responds() const {
   if (!options_.shared) return true;
@@ -105,25 +89,16 @@ bool RigClaims::Responds() const {
   return Clock::now() - responded_ < kBeatsToRespond * options_.beat;
 }
 
-void RigClaims::Run() {
-  Backoff backoff;
-  std::unique_lock lock(mutex_);
-  while (running_) {
-    woken_ = false;
-    lock.unlock();
-    auto pause = Pass();
-    const bool responded = pause.ok();
-    if (responded) {
-      backoff.Reset();
-    } else {
-      spdlog::warn("cannot claim rigs: {}", pause.status().ToString());
-      pause = std::min(backoff.Next(), options_.beat);
-    }
-    lock.lock();
-    if (responded) responded_ = Clock::now();
-    changed_.wait_for(lock, kPause, [this] { return !running_; });
-    changed_.wait_for(lock, *pause, [this] { return !running_ || woken_; });
+std::chrono::milliseconds RigClaims::PassOrBackOff(Backoff* backoff) {
+  const auto pause = Pass();
+  if (!pause.ok()) {
+    spdlog::warn("cannot claim rigs: {}", pause.status().ToString());
+    return std::min(backoff->Next(), options_.beat);
   }
+  backoff->Reset();
+  const std::lock_guard lock(mutex_);
+  responded_ = Clock::now();
+  return *pause;
 }
 
 absl::StatusOr<std::chrono::milliseconds> RigClaims::Pass() {
@@ -145,13 +120,11 @@ absl::StatusOr<std::chrono::milliseconds> RigClaims::Pass() {
 absl::Status RigClaims::Begin() {
   const std::string name = NewName();
   SELFCAL_RETURN_IF_ERROR(store_->replicas()->Add(name));
-  seen_.clear();
-  looked_.reset();
+  others_.Clear();
   next_beat_ = Clock::now();
-  const std::lock_guard lock(mutex_);
-  replica_ = name;
-  held_.clear();
   busy_ = 0;
+  held_.Reset(name);
+  const std::lock_guard lock(mutex_);
   is_first_ = false;
   responded_ = Clock::now();
   return absl::OkStatus();
@@ -170,31 +143,15 @@ absl::Status RigClaims::Beat() {
 absl::Status RigClaims::RemoveSilent() {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<ReplicaRecord> records,
                            store_->replicas()->List());
-  const Clock::time_point now = Clock::now();
-  // Nobody could beat while the database did not respond.
-  const bool missed = !looked_ || now - *looked_ > 3 * options_.beat;
-  looked_ = now;
-  std::map<std::string, Seen> seen;
-  std::string first = replica();
-  for (const ReplicaRecord& record : records) {
-    if (record.replica == replica()) continue;
-    const auto before = seen_.find(record.replica);
-    const bool has_grown =
-        before == seen_.end() || before->second.beat != record.beat;
-    const Clock::time_point since =
-        has_grown || missed ? now : before->second.since;
-    if (now - since > options_.lease) {
-      spdlog::warn("daemon {} does not respond: its rigs are free",
-                   record.replica);
-      SELFCAL_RETURN_IF_ERROR(store_->replicas()->Remove(record));
-      continue;
-    }
-    seen[record.replica] = {record.beat, since};
-    first = std::min(first, record.replica);
+  const OtherReplicas::Summary others =
+      others_.Update(replica(), records, Clock::now());
+  for (const ReplicaRecord& record : others.silent) {
+    spdlog::warn("daemon {} does not respond: its rigs are free",
+                 record.replica);
+    SELFCAL_RETURN_IF_ERROR(store_->replicas()->Remove(record));
   }
-  seen_ = std::move(seen);
   const std::lock_guard lock(mutex_);
-  is_first_ = first == replica_;
+  is_first_ = others.is_first;
   return absl::OkStatus();
 }
 
@@ -203,16 +160,8 @@ absl::Status RigClaims::Review() {
                            store_->replicas()->ListBusy(replica()));
   std::set<std::string> busy;
   for (const RigClaim& claim : listed) busy.insert(claim.rig);
-  const Clock::time_point now = Clock::now();
-  std::vector<RigClaim> idle;
-  {
-    const std::lock_guard lock(mutex_);
-    for (auto& [rig, held] : held_) {
-      if (busy.contains(rig)) held.idle_since = now;
-      if (now - held.idle_since > kKeep) idle.push_back(held.claim);
-    }
-    busy_ = static_cast<int>(busy.size());
-  }
+  const std::vector<RigClaim> idle = held_.NoteBusy(busy, Clock::now());
+  busy_ = static_cast<int>(busy.size());
   // A claim, or its release, whose outcome was not known: with the number of
   // another claim, nothing that was begun before is written.
   for (const RigClaim& claim : listed) {
@@ -220,10 +169,7 @@ absl::Status RigClaims::Review() {
   }
   for (const RigClaim& claim : idle) {
     if (Clock::now() >= next_beat_) break;  // after the next beat
-    {
-      const std::lock_guard lock(mutex_);
-      held_.erase(claim.rig);
-    }
+    held_.Remove(claim.rig);
     const absl::Status released = store_->replicas()->Release(claim);
     // A rig that was deleted has no claim any more.
     if (!released.ok() && !absl::IsNotFound(released)) return released;
@@ -235,9 +181,7 @@ absl::Status RigClaims::Claim(const std::string& rig) {
   const auto claim = store_->replicas()->Claim(rig, replica());
   if (absl::IsNotFound(claim.status())) return absl::OkStatus();  // deleted
   SELFCAL_RETURN_IF_ERROR(claim.status());
-  if (!*claim) return absl::OkStatus();
-  const std::lock_guard lock(mutex_);
-  held_.insert_or_assign(rig, Held{**claim, Clock::now()});
+  if (*claim) held_.Add(**claim, Clock::now());
   return absl::OkStatus();
 }
 
@@ -246,8 +190,7 @@ absl::StatusOr<bool> RigClaims::ClaimMore() {
                            store_->replicas()->ListUnclaimed(kRigsAtATime + 1));
   for (std::size_t i = 0; i < unclaimed.size() && i < kRigsAtATime; ++i) {
     SELFCAL_RETURN_IF_ERROR(Claim(unclaimed[i]));
-    const std::lock_guard lock(mutex_);
-    if (held_.contains(unclaimed[i])) ++busy_;
+    if (held_.Find(unclaimed[i])) ++busy_;
   }
   return unclaimed.size() > kRigsAtATime;
 }

@@ -5,19 +5,19 @@
 #pragma once
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 #include <chrono>
-#include <condition_variable>
-#include <cstdint>
 #include <functional>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
+#include "server/pipeline/backoff.h"
+#include "server/pipeline/held_claims.h"
+#include "server/pipeline/other_replicas.h"
+#include "server/pipeline/periodic_thread.h"
 #include "server/pipeline/pipeline.h"
-#include "server/store/replicas.h"
 #include "server/store/rig_claim.h"
 
 namespace selfcal::server {
@@ -54,17 +54,9 @@ class RigClaims {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Held {
-    RigClaim claim;
-    Clock::time_point idle_since;  // had work up to then
-  };
-  // The beat of another replica.
-  struct Seen {
-    std::int64_t beat = 0;
-    Clock::time_point since;
-  };
 
-  void Run();
+  // A pass of the thread, with the pause after it, also if it fails.
+  std::chrono::milliseconds PassOrBackOff(Backoff* backoff);
   // Returns how long to wait before the next pass.
   absl::StatusOr<std::chrono::milliseconds> Pass();
   absl::Status Begin();
@@ -81,21 +73,17 @@ class RigClaims {
   Store* const store_;
   const ReplicaOptions options_;
   const std::function<void()> on_beat_;
-  std::thread thread_;
+  HeldClaims held_;
   // The next three are used by the thread alone.
-  std::map<std::string, Seen> seen_;
-  std::optional<Clock::time_point> looked_;  // at the others, the last time
+  OtherReplicas others_;
   Clock::time_point next_beat_;
-
-  mutable std::mutex mutex_;  // guards what follows
-  std::condition_variable changed_;
-  bool running_ = false;
-  bool woken_ = false;
-  bool is_first_ = false;
   int busy_ = 0;  // claims with work
+
+  mutable std::mutex mutex_;  // guards the next two
+  bool is_first_ = false;
   Clock::time_point responded_;
-  std::string replica_;  // empty while there is no record of it
-  std::map<std::string, Held> held_;
+
+  PeriodicThread thread_;
 };
 
 }  // namespace selfcal::server
