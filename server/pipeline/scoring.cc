@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <exception>
 #include <limits>
+#include <map>
+#include <set>
+#include <utility>
 
 #include "server/pipeline/backoff.h"
 #include "server/status/status_macros.h"
@@ -36,14 +39,17 @@ ScoringWorkers::ScoringWorkers(
     std::function<void(const std::string&)> on_change,
     std::function<void(const std::string&)> on_done)
     : domain_(domain),
-      store_(domain->store()),
       claims_(claims),
       options_(options),
       estimators_(std::move(estimators)),
       on_run_(std::move(on_run)),
       on_change_(std::move(on_change)),
       on_done_(std::move(on_done)),
-      backlog_(options.max_backlog) {}
+      places_(options.max_backlog),
+      queue_(claims, [this] {
+        return store()->ListUnscored(std::numeric_limits<int>::max(),
+                                     claims_->replica());
+      }) {}
 
 ScoringWorkers::~ScoringWorkers() { Stop(); }
 
@@ -52,19 +58,16 @@ absl::Status ScoringWorkers::Start() {
   std::vector<Store::Unscored> left;
   if (!options_.replica.shared) {
     SELFCAL_ASSIGN_OR_RETURN(
-        left, store_->ListUnscored(std::numeric_limits<int>::max()));
+        left, store()->ListUnscored(std::numeric_limits<int>::max()));
   }
+  std::map<std::string, int> filled;
+  for (const Store::Unscored& segment : left) ++filled[segment.rig];
   const std::lock_guard lock(mutex_);
-  if (running_) {
+  if (!threads_.empty()) {
     return absl::FailedPreconditionError("scoring has been started already");
   }
-  running_ = true;
-  std::map<std::string, int> taken;
-  for (const Store::Unscored& segment : left) {
-    ++taken[segment.rig];
-    ++filled_[segment.rig];
-  }
-  backlog_.Open(std::move(taken));
+  places_.Open(filled);
+  queue_.Open();
   for (int k = 0; k < std::max(1, options_.scoring_threads); ++k) {
     threads_.emplace_back([this] { Run(); });
   }
@@ -75,11 +78,10 @@ void ScoringWorkers::Stop() {
   std::vector<std::thread> threads;
   {
     const std::lock_guard lock(mutex_);
-    running_ = false;
+    queue_.Close();
+    places_.Close();
     threads.swap(threads_);
   }
-  backlog_.Close();
-  changed_.notify_all();
   for (std::thread& thread : threads) {
     thread.join();
   }
@@ -87,77 +89,44 @@ void ScoringWorkers::Stop() {
 
 absl::Status ScoringWorkers::TakePlace(const std::string& rig,
                                        const std::function<bool()>& cancelled) {
-  return backlog_.Take(rig, cancelled);
+  return places_.Take(rig, cancelled);
 }
 
 void ScoringWorkers::FillPlace(const std::string& rig) {
-  {
-    const std::lock_guard lock(mutex_);
-    ++filled_[rig];
-    ++arrivals_;
-  }
-  changed_.notify_all();
+  places_.Fill(rig);
+  queue_.Wake();
   if (!claims_->Find(rig)) claims_->Wake();
 }
 
+void ScoringWorkers::ReturnPlace(const std::string& rig) {
+  places_.Return(rig);
+}
+
 void ScoringWorkers::Wake() {
-  {
-    const std::lock_guard lock(mutex_);
-    ++arrivals_;
-  }
-  changed_.notify_all();
+  queue_.Wake();
   ReturnPlacesOfOthers();
 }
 
 void ScoringWorkers::ReturnPlacesOfOthers() {
-  std::vector<std::string> rigs;
-  {
-    const std::lock_guard lock(mutex_);
-    for (const auto& [rig, places] : filled_) {
-      if (!claims_->Find(rig)) rigs.push_back(rig);
-    }
-  }
+  std::vector<std::string> rigs = places_.FilledRigs();
+  std::erase_if(rigs, [this](const auto& rig) { return claims_->Find(rig); });
   for (const std::string& rig : rigs) {
-    const auto unscored = store_->CountUnscored(rig);
+    const auto unscored = store()->CountUnscored(rig);
     if (!unscored.ok()) return;  // the next call tries again
-    const std::lock_guard lock(mutex_);
-    const auto filled = filled_.find(rig);
-    if (filled == filled_.end()) continue;
-    const std::int64_t scored =
-        std::max<std::int64_t>(0, filled->second - *unscored);
-    backlog_.Return(rig, static_cast<int>(scored));
-    filled->second -= scored;
-    if (filled->second == 0) filled_.erase(filled);
+    places_.EmptyAllBut(rig, *unscored);
   }
-}
-
-void ScoringWorkers::EmptyPlaces(const std::string& rig, int places) {
-  backlog_.Return(rig, places);
-  const auto filled = filled_.find(rig);
-  if (filled == filled_.end()) return;
-  filled->second -= places;
-  if (filled->second <= 0) filled_.erase(filled);
-}
-
-void ScoringWorkers::ReturnPlace(const std::string& rig) {
-  backlog_.Return(rig);
 }
 
 absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
     const std::string& rig,
     const std::function<absl::StatusOr<QuarantineCommit>()>& change) {
-  decltype(claimed_) claimed;
-  {
-    const std::lock_guard lock(mutex_);
-    changing_.insert(rig);
-    claimed = claimed_;
-  }
+  const std::set<std::int64_t> claimed = queue_.BeginChange(rig);
   auto commit = change();
   int waiting = 0;
   if (commit.ok()) {
     // A worker that has claimed one returns its place itself.
     for (const std::int64_t sequence : commit->unscored_sequences) {
-      if (!claimed.contains({rig, sequence})) ++waiting;
+      if (!claimed.contains(sequence)) ++waiting;
     }
   }
   EndChange(rig, waiting);
@@ -167,105 +136,31 @@ absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
 absl::Status ScoringWorkers::Delete(
     const std::string& rig,
     const std::function<absl::StatusOr<int>()>& change) {
-  {
-    std::unique_lock lock(mutex_);
-    changing_.insert(rig);
-    changed_.wait(lock, [&] {
-      const auto first =
-          claimed_.lower_bound({rig, std::numeric_limits<std::int64_t>::min()});
-      return first == claimed_.end() || first->first.first != rig;
-    });
-  }
+  queue_.BeginChange(rig);
+  queue_.WaitForClaims(rig);
   const absl::StatusOr<int> waiting = change();
   EndChange(rig, waiting.ok() ? *waiting : 0);
   return waiting.status();
 }
 
 void ScoringWorkers::EndChange(const std::string& rig, int waiting) {
-  {
-    const std::lock_guard lock(mutex_);
-    EmptyPlaces(rig, waiting);
-    changing_.erase(changing_.find(rig));
-    ++arrivals_;  // what was passed over meanwhile is looked at again
-  }
-  changed_.notify_all();
+  places_.Empty(rig, waiting);
+  queue_.EndChange(rig);
 }
 
 void ScoringWorkers::Run() {
-  while (const std::optional<Claim> claim = NextClaim()) {
+  while (const std::optional<Claim> claim = queue_.Next()) {
     Process(*claim);
   }
 }
 
-std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
-  Backoff backoff;
-  std::unique_lock lock(mutex_);
-  while (running_) {
-    // Under the lock, a segment is either in the list, or its FillPlace is
-    // still to come and wakes this thread.
-    const std::int64_t seen = arrivals_;
-    const auto unscored = store_->ListUnscored(std::numeric_limits<int>::max(),
-                                               claims_->replica());
-    if (!unscored.ok()) {
-      spdlog::error("cannot list what to score: {}",
-                    unscored.status().ToString());
-      changed_.wait_for(lock, backoff.Next(), [this] { return !running_; });
-      continue;
-    }
-    if (std::optional<Claim> next = Choose(*unscored)) {
-      claimed_.emplace(std::pair(next->rig, next->sequence), next->of_rig);
-      return next;
-    }
-    changed_.wait(lock, [&] { return !running_ || arrivals_ != seen; });
-  }
-  return std::nullopt;
-}
-
-std::optional<ScoringWorkers::Claim> ScoringWorkers::Choose(
-    const std::vector<Store::Unscored>& unscored) {
-  std::vector<Claim> claims;
-  std::vector<FairOrder::Piece> pieces;
-  for (const Store::Unscored& candidate : unscored) {
-    // A rig's next is the oldest that nobody scores.
-    if ((!claims.empty() && claims.back().rig == candidate.rig) ||
-        changing_.contains(candidate.rig) ||
-        claimed_.contains({candidate.rig, candidate.sequence})) {
-      continue;
-    }
-    const std::optional<RigClaim> rig = claims_->Find(candidate.rig);
-    if (!rig || IsScoredUnderAnother(*rig)) continue;
-    claims.push_back({candidate.rig, *rig, candidate.key, candidate.sequence});
-    // The time of a score grows with the number of readings.
-    pieces.push_back({candidate.rig, static_cast<double>(candidate.readings)});
-  }
-  const std::optional<std::size_t> next = order_.Take(pieces);
-  if (!next) return std::nullopt;
-  return claims[*next];
-}
-
-// The score of the older segment would be refused, and computed once more after
-// that of this one.
-bool ScoringWorkers::IsScoredUnderAnother(const RigClaim& claim) const {
-  for (auto scored = claimed_.lower_bound(
-           {claim.rig, std::numeric_limits<std::int64_t>::min()});
-       scored != claimed_.end() && scored->first.first == claim.rig;
-       ++scored) {
-    if (scored->second != claim) return true;
-  }
-  return false;
-}
-
 void ScoringWorkers::Process(const Claim& claim) {
   const auto score = FindScore(claim);
-  if (score && WaitForTurn(claim)) {
+  if (score && queue_.WaitForTurn(claim)) {
     Commit(claim, *score);
   }
-  {
-    const std::lock_guard lock(mutex_);
-    claimed_.erase({claim.rig, claim.sequence});
-    EmptyPlaces(claim.rig, 1);
-  }
-  changed_.notify_all();
+  places_.Empty(claim.rig, 1);
+  queue_.End(claim);
   on_done_(claim.rig);
 }
 
@@ -289,11 +184,11 @@ std::optional<absl::StatusOr<ScoringWorkers::Score>> ScoringWorkers::FindScore(
 
 absl::StatusOr<ScoringWorkers::Score> ScoringWorkers::TryScore(
     const Claim& claim) {
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(claim.rig));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store()->GetRig(claim.rig));
   SELFCAL_ASSIGN_OR_RETURN(const MotionSegment segment,
-                           store_->GetSegmentData(claim.rig, claim.key));
+                           store()->GetSegmentData(claim.rig, claim.key));
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
-                           store_->GetActiveCalibration(claim.rig));
+                           store()->GetActiveCalibration(claim.rig));
   Score score{estimators_.score(rig.rig, active.theta, segment),
               std::nullopt,
               {active.version, PriorSigmas(rig.rig)}};
@@ -304,16 +199,6 @@ absl::StatusOr<ScoringWorkers::Score> ScoringWorkers::TryScore(
     return absl::InternalError("its information is not finite");
   }
   return score;
-}
-
-bool ScoringWorkers::WaitForTurn(const Claim& claim) {
-  std::unique_lock lock(mutex_);
-  const auto is_oldest = [&] {
-    const auto oldest = claimed_.lower_bound({claim.rig, 0});
-    return oldest->first.second == claim.sequence;
-  };
-  changed_.wait(lock, [&] { return !running_ || is_oldest(); });
-  return is_oldest();
 }
 
 void ScoringWorkers::Commit(const Claim& claim,
@@ -389,7 +274,7 @@ void ScoringWorkers::Quarantine(const Claim& claim, const absl::Status& why) {
     spdlog::error("cannot quarantine {}: {}",
                   Name(claim.rig, claim.key),
                   status.ToString());
-    if (!Pause(backoff.Next())) {
+    if (!queue_.Pause(backoff.Next())) {
       return;
     }
   }
@@ -403,16 +288,10 @@ absl::Status ScoringWorkers::Retry(const std::function<absl::Status()>& call) {
       return status;
     }
     spdlog::warn("scoring waits: {}", status.ToString());
-    if (!Pause(backoff.Next())) {
+    if (!queue_.Pause(backoff.Next())) {
       return status;
     }
   }
-}
-
-bool ScoringWorkers::Pause(std::chrono::milliseconds time) {
-  std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, time, [this] { return !running_; });
-  return running_;
 }
 
 }  // namespace selfcal::server

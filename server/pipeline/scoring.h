@@ -1,9 +1,6 @@
-// The threads that score: each claims the oldest segment that is not claimed of
-// the rig whose turn it is, scores it without a lock, and commits the score
-// when all older ones of its rig are committed. Rigs with unscored segments
-// take turns, so that none waits for the many or slow segments of another.
-// Claims are only in memory: after a crash the store still lists the segment as
-// unscored.
+// The threads that score: each claims the next segment (scoring_queue.h),
+// scores it without a lock, and commits the score when all older ones of its
+// rig are committed.
 //
 // A segment is scored at the active calibration, whatever version its states
 // were estimated with, so that scores refer to the present calibration even if
@@ -13,24 +10,18 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include <chrono>
-#include <condition_variable>
-#include <cstdint>
 #include <functional>
-#include <map>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "server/domain/domain.h"
-#include "server/pipeline/backlog.h"
-#include "server/pipeline/fair_order.h"
 #include "server/pipeline/pipeline.h"
 #include "server/pipeline/rig_claims.h"
+#include "server/pipeline/scoring_places.h"
+#include "server/pipeline/scoring_queue.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -77,12 +68,7 @@ class ScoringWorkers {
                       const std::function<absl::StatusOr<int>()>& change);
 
  private:
-  struct Claim {
-    std::string rig;
-    RigClaim of_rig;
-    SegmentKey key;
-    std::int64_t sequence;
-  };
+  using Claim = ScoringQueue::Claim;
   // Results for a segment.
   struct Score {
     SegmentInformation information;
@@ -91,24 +77,13 @@ class ScoringWorkers {
   };
 
   void Run();
-  std::optional<Claim> NextClaim();
-  // Returns which of the unscored segments, oldest first, to score next. The
-  // lock must be held.
-  std::optional<Claim> Choose(const std::vector<Store::Unscored>& unscored);
-  // True if a segment of the rig is being scored under another claim of it. The
-  // lock must be held.
-  bool IsScoredUnderAnother(const RigClaim& claim) const;
   void ReturnPlacesOfOthers();
-  // Segments of the rig may be claimed again; so many that waited for their
-  // scores no longer do.
+  // So many segments of the rig no longer wait for their scores.
   void EndChange(const std::string& rig, int waiting);
-  // The lock must be held.
-  void EmptyPlaces(const std::string& rig, int places);
   void Process(const Claim& claim);
   // The score, or what is wrong with the segment. nullopt when stopping.
   std::optional<absl::StatusOr<Score>> FindScore(const Claim& claim);
   absl::StatusOr<Score> TryScore(const Claim& claim);
-  bool WaitForTurn(const Claim& claim);
   void Commit(const Claim& claim, const absl::StatusOr<Score>& score);
   absl::Status TryCommit(const Claim& claim, const Score& score);
   // Computes a score again that was committed with an outdated basis.
@@ -117,33 +92,19 @@ class ScoringWorkers {
   // Repeats the call until it succeeds or fails for good; when stopping,
   // returns the last result.
   absl::Status Retry(const std::function<absl::Status()>& call);
-  bool Pause(std::chrono::milliseconds time);  // false when stopping
+  Store* store() const { return domain_->store(); }
 
   Domain* const domain_;
-  Store* const store_;
   RigClaims* const claims_;
   const PipelineOptions options_;
   const Estimators estimators_;
   const std::function<void(const StoredRun&)> on_run_;
   const std::function<void(const std::string&)> on_change_;
   const std::function<void(const std::string&)> on_done_;
-
-  Backlog backlog_;
-  // Guards what follows. The store's thread waits for it when it has stored a
-  // segment (FillPlace), so that nobody may wait for a write while holding it.
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool running_ = false;
-  std::int64_t arrivals_ = 0;  // reasons to look for segments, since the start
-  std::map<std::string, std::int64_t> filled_;  // places in the backlog, by rig
-  FairOrder order_;
-  // Rig and sequence of the segments that are being scored, and the claim of
-  // their rig under which they are.
-  std::map<std::pair<std::string, std::int64_t>, RigClaim> claimed_;
-  // Rigs whose segments are being quarantined or deleted: no further one of
-  // them is claimed.
-  std::multiset<std::string> changing_;
-  std::vector<std::thread> threads_;
+  ScoringPlaces places_;
+  ScoringQueue queue_;
+  std::mutex mutex_;                  // guards threads_
+  std::vector<std::thread> threads_;  // none unless it is started
 };
 
 }  // namespace selfcal::server
