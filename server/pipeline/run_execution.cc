@@ -5,8 +5,10 @@
 
 #include <exception>
 #include <optional>
+#include <string>
 #include <utility>
 
+#include "server/domain/run_interval.h"
 #include "server/pipeline/backoff.h"
 #include "server/pipeline/run_candidate.h"
 #include "server/pipeline/run_validation.h"
@@ -36,23 +38,10 @@ absl::StatusOr<std::string> DeferReason(const RunContext& context,
   if (run.trigger == RunTrigger::kManual) {
     return "";
   }
-  Store* const store = context.store();
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(run.rig));
-  const std::int64_t interval_ns = rig.policy.recalibration_min_interval_ns;
-  if (interval_ns > 0) {
-    // The newest is this run.
-    SELFCAL_ASSIGN_OR_RETURN(const auto newest,
-                             store->ListRuns(run.rig, {2, ""}));
-    const bool too_early =
-        newest.items.size() > 1 &&
-        context.options.now_ns() - newest.items[1].end_steady_ns < interval_ns;
-    if (too_early) {
-      return fmt::format(
-          "the minimum interval of {:g} s since recalibration {} is not over",
-          static_cast<double>(interval_ns) * 1e-9,
-          newest.items[1].run);
-    }
-  }
+  SELFCAL_ASSIGN_OR_RETURN(
+      std::string interval,
+      IntervalReason(context.store(), run, context.options.now_ns()));
+  if (!interval.empty()) return interval;
   Conditions* const conditions = context.options.conditions;
   return conditions == nullptr ? "" : conditions->DeferReason();
 }
