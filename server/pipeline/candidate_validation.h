@@ -82,8 +82,8 @@ struct CandidateLimits {
   // rejects at most one sound candidate in 10,000, if the noise is as assumed.
   double min_probability = 1e-4;
   // Errors of the candidate over the stated ones, if the data contradicts the
-  // prior, and that is as wrong in what the data does not show. Chosen, not
-  // measured.
+  // prior, and that is as wrong in the directions that were held constant.
+  // Chosen, not measured.
   double max_error_ratio = 1.1;
   // Largest variance between segments over that which noise explains; more if
   // few degrees of freedom are tested, so that chance alone exceeds it once in

@@ -238,22 +238,34 @@ TEST_F(CandidateTest, ValuesMustLieWithinTenPriorSigmasOfTheFactory) {
   EXPECT_THAT(Problem("prior_sigmas"), HasSubstr(components[k].name));
 }
 
-// Three tolerances off in what is shown, and as uncertain as they are in the
-// rest.
+// Three tolerances off in what is shown; every second component is held
+// constant, with the uncertainty of its tolerance.
 TEST_F(CandidateTest, DataMustAgreeWithThePriorUnlessItDecidesAlone) {
   const Eigen::VectorXd prior = PriorSigmas(rig_);
   result_.theta = BoxPlus(rig_.factory, 3 * prior);
   EXPECT_THAT(Problems(), IsEmpty());
-  EXPECT_NEAR(Check("prior_agreement").value, 1, 0.01);
-  result_.covariance = (0.5 * prior).cwiseAbs2().asDiagonal();
+  EXPECT_EQ(Check("prior_agreement").value, 1);
+  const std::vector<int> free = FreeComponents(rig_);
+  Eigen::VectorXd offset = Eigen::VectorXd::Zero(prior.size());
+  Eigen::VectorXd sigmas = Eigen::VectorXd::Zero(prior.size());
+  int held = 0;
+  for (std::size_t k = 0; k < free.size(); ++k) {
+    const int component = free[k];
+    const bool shown = k % 2 == 0;
+    offset(component) = shown ? 3 * prior(component) : 0;
+    sigmas(component) = (shown ? 0.5 : 1) * prior(component);
+    held += shown ? 0 : 1;
+  }
+  result_.theta = BoxPlus(rig_.factory, offset);
+  result_.covariance = sigmas.cwiseAbs2().asDiagonal();
   evidence_.active.covariance = result_.covariance;
   const std::string problem = Problem("prior_agreement");
   EXPECT_THAT(problem, HasSubstr("prior_sigmas"));
-  // Data alone would be 4 tolerances off, with a sigma of 0.58: 3.5 times as
-  // far as expected, in a fourth of the variance.
-  EXPECT_THAT(problem, HasSubstr("3.5 times as far"));
+  // Of a difference of 3 tolerances, and a sigma of 0.5 beside that of the
+  // prior: 2.7 times as far as expected.
+  EXPECT_THAT(problem, HasSubstr("2.7 times as far"));
   EXPECT_NEAR(Check("prior_agreement").value,
-              std::sqrt(1 + (3.4641 * 3.4641 - 1) * 0.25),
+              std::sqrt(1 + (9 / 1.25 - 1) * held / std::ssize(free)),
               0.01);
   // After a device change another prior was used.
   evidence_.has_factory_prior = false;
