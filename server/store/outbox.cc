@@ -11,6 +11,7 @@
 #include "server/store/driver/statement.h"
 #include "server/store/driver/transaction.h"
 #include "server/store/inventory.h"
+#include "server/store/own_rig.h"
 #include "server/store/reported_rows.h"
 #include "server/store/rigs.h"
 
@@ -104,9 +105,8 @@ class OutboxOfDatabase final : public Outbox {
       rigs.clear();
       Statement read(db,
                      "SELECT id FROM rigs r WHERE NOT EXISTS "
-                     "  (SELECT 1 FROM uplinks u WHERE u.rig = r.rig) "
-                     "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                     "  WHERE p.rig = r.rig) ORDER BY id");
+                     "  (SELECT 1 FROM uplinks u WHERE u.rig = r.rig) AND " +
+                         IsOwnRig("r.rig") + " ORDER BY id");
       while (read.Next()) rigs.push_back(read.Text(0));
       return read.status();
     }));

@@ -8,6 +8,7 @@
 #include "server/store/driver/driver.h"
 #include "server/store/driver/statement.h"
 #include "server/store/driver/transaction.h"
+#include "server/store/own_rig.h"
 #include "server/store/rigs.h"
 
 namespace selfcal::server {
@@ -113,11 +114,12 @@ class ReplicasOfDatabase final : public Replicas {
                      "SELECT id FROM rigs r WHERE rig IN "
                      "  (SELECT rig FROM segments WHERE state = 1 "
                      "   UNION SELECT rig FROM runs WHERE state IN (1, 2)) "
-                     "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                     "  WHERE p.rig = r.rig) "
-                     "AND NOT EXISTS (SELECT 1 FROM claims c "
-                     "  JOIN replicas USING (replica) WHERE c.rig = r.rig) "
-                     "LIMIT ?1",
+                     "AND " +
+                         IsOwnRig("r.rig") +
+                         " "
+                         "AND NOT EXISTS (SELECT 1 FROM claims c "
+                         "  JOIN replicas USING (replica) WHERE c.rig = r.rig) "
+                         "LIMIT ?1",
                      limit);
       while (read.Next()) rigs.push_back(read.Text(0));
       return read.status();
@@ -133,12 +135,13 @@ class ReplicasOfDatabase final : public Replicas {
       Statement read(db,
                      "SELECT r.id, c.rig, c.number FROM claims c "
                      "JOIN rigs r ON r.rig = c.rig WHERE c.replica = ?1 "
-                     "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                     "  WHERE p.rig = c.rig) "
-                     "AND (EXISTS (SELECT 1 FROM segments s "
-                     "       WHERE s.rig = c.rig AND s.state = 1) "
-                     "  OR EXISTS (SELECT 1 FROM runs u "
-                     "       WHERE u.rig = c.rig AND u.state IN (1, 2)))",
+                     "AND " +
+                         IsOwnRig("c.rig") +
+                         " "
+                         "AND (EXISTS (SELECT 1 FROM segments s "
+                         "       WHERE s.rig = c.rig AND s.state = 1) "
+                         "  OR EXISTS (SELECT 1 FROM runs u "
+                         "       WHERE u.rig = c.rig AND u.state IN (1, 2)))",
                      replica);
       while (read.Next())
         busy.emplace_back(read.Text(0), read.Int(1), read.Int(2));

@@ -6,6 +6,7 @@
 #include "server/status/status_macros.h"
 #include "server/store/driver/sql_condition.h"
 #include "server/store/driver/statement.h"
+#include "server/store/own_rig.h"
 
 namespace selfcal::server {
 namespace {
@@ -15,14 +16,14 @@ constexpr std::ptrdiff_t kRigsOfQuery = 1000;
 }  // namespace
 
 absl::StatusOr<Store::WorkCount> CountWorkRows(Connection* db) {
-  Statement read(db,
-                 "SELECT "
-                 "(SELECT COUNT(*) FROM segments s WHERE s.state = 1 "
-                 "  AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                 "    WHERE p.rig = s.rig)), "
-                 "(SELECT COUNT(*) FROM runs r WHERE r.state IN (1, 2) "
-                 "  AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                 "    WHERE p.rig = r.rig))");
+  Statement read(
+      db,
+      "SELECT "
+      "(SELECT COUNT(*) FROM segments s WHERE s.state = 1 AND " +
+          IsOwnRig("s.rig") +
+          "), "
+          "(SELECT COUNT(*) FROM runs r WHERE r.state IN (1, 2) AND " +
+          IsOwnRig("r.rig") + ")");
   Store::WorkCount work;
   if (read.Next()) work = {read.Int(0), read.Int(1)};
   SELFCAL_RETURN_IF_ERROR(read.status());
@@ -42,7 +43,8 @@ absl::StatusOr<std::set<std::string>> BusyRigs(
         "  AND s.rig = r.rig) "
         "OR EXISTS (SELECT 1 FROM runs u WHERE u.state IN (1, 2) "
         "  AND u.rig = r.rig)) "
-        "AND NOT EXISTS (SELECT 1 FROM reported_rigs p WHERE p.rig = r.rig)");
+        "AND " +
+        IsOwnRig("r.rig"));
     Statement read(db,
                    condition.reuse(),
                    "SELECT r.id FROM rigs r WHERE " + condition.sql());

@@ -10,6 +10,7 @@
 #include "server/store/announcements.h"
 #include "server/store/driver/sql_condition.h"
 #include "server/store/driver/statement.h"
+#include "server/store/own_rig.h"
 #include "server/store/paging.h"
 #include "server/store/rig_lists.h"
 #include "server/store/rigs.h"
@@ -243,9 +244,9 @@ absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(
                  std::string(kRunColumns) +
                      "WHERE r.state IN (1, 2) AND (?1 = '' OR EXISTS "
                      "  (SELECT 1 FROM claims c "
-                     "   WHERE c.rig = r.rig AND c.replica = ?1)) "
-                     "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                     "  WHERE p.rig = r.rig) "
+                     "   WHERE c.rig = r.rig AND c.replica = ?1)) AND " +
+                     IsOwnRig("r.rig") +
+                     " "
                      "ORDER BY r.create_steady_ns, r.rig, r.run",
                  replica);
   return ReadAll(db, &read);

@@ -6,6 +6,7 @@
 #include "server/store/driver/statement.h"
 #include "server/store/exclusions.h"
 #include "server/store/outbox.h"
+#include "server/store/own_rig.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_path.h"
 
@@ -260,9 +261,10 @@ absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
                  "WHERE s.state = 1 AND (?2 = '' OR EXISTS "
                  "  (SELECT 1 FROM claims c "
                  "   WHERE c.rig = s.rig AND c.replica = ?2)) "
-                 "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                 "  WHERE p.rig = s.rig) "
-                 "ORDER BY s.rig, s.sequence LIMIT ?1",
+                 "AND " +
+                     IsOwnRig("s.rig") +
+                     " "
+                     "ORDER BY s.rig, s.sequence LIMIT ?1",
                  limit,
                  replica);
   std::vector<Store::Unscored> unscored;
