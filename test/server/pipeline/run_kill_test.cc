@@ -1,15 +1,15 @@
 // A daemon that is killed on either side of every commit of a run, and in the
 // solver: the trigger still gives one run, and that one version.
 #include <signal.h>
-#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
-#include <string_view>
+#include <utility>
 
 #include "test/promise.h"
 #include "test/server/pipeline/pipeline_test.h"
+#include "test/server/store/store_test.h"
 
 namespace selfcal::server {
 namespace {
@@ -24,24 +24,53 @@ Bomb bomb;  // of the child, as what it counts over all threads of the store
 std::atomic<int> commits;
 std::atomic<int> committed;
 
-int BeforeCommit(void*) {
-  if (++commits == bomb.before_commit) raise(SIGKILL);
-  return 0;
-}
+// Kills the process at the end of a transaction, before it is committed, or
+// once it is.
+class DeadlyDatabase final : public Database {
+ public:
+  explicit DeadlyDatabase(std::unique_ptr<Database> database)
+      : database_(std::move(database)) {}
 
-// Called when a statement has run to its end.
-int AfterStatement(unsigned, void*, void* statement, void*) {
-  const char* sql = sqlite3_sql(static_cast<sqlite3_stmt*>(statement));
-  const bool commit = sql != nullptr && std::string_view(sql) == "COMMIT";
-  if (commit && ++committed == bomb.after_commit) raise(SIGKILL);
-  return 0;
-}
+  absl::Status Write(Work work) override {
+    const absl::Status status = database_->Write(Deadly(std::move(work)));
+    NoteCommitted(status);
+    return status;
+  }
+  void BeginWrite(Work work, Done done) override {
+    database_->BeginWrite(Deadly(std::move(work)),
+                          [done = std::move(done)](const absl::Status& status) {
+                            NoteCommitted(status);
+                            done(status);
+                          });
+  }
+  absl::Status Read(const Work& query) override {
+    return database_->Read(query);
+  }
+  absl::Status ReadForService(const Work& query) override {
+    return database_->ReadForService(query);
+  }
+  absl::StatusOr<std::unique_ptr<Connection>> OpenReader() override {
+    return database_->OpenReader();
+  }
+  std::unique_ptr<Listener> Listen(const Listener::Heard& heard) override {
+    return database_->Listen(heard);
+  }
+  DatabaseCopies* copies() override { return database_->copies(); }
 
-int Watch(sqlite3* db, char**, const sqlite3_api_routines*) {
-  sqlite3_commit_hook(db, BeforeCommit, nullptr);
-  sqlite3_trace_v2(db, SQLITE_TRACE_PROFILE, AfterStatement, nullptr);
-  return SQLITE_OK;
-}
+ private:
+  static Work Deadly(Work work) {
+    return [work = std::move(work)](Connection* db) {
+      absl::Status status = work(db);
+      if (status.ok() && ++commits == bomb.before_commit) raise(SIGKILL);
+      return status;
+    };
+  }
+  static void NoteCommitted(const absl::Status& status) {
+    if (status.ok() && ++committed == bomb.after_commit) raise(SIGKILL);
+  }
+
+  const std::unique_ptr<Database> database_;
+};
 
 CalibrationResult Solve(const Rig& rig,
                         const Calibration& start,
@@ -72,13 +101,23 @@ bool Ended(Store* store) {
   return run.ok() && run->end_time_ns != 0;
 }
 
-// The life of a daemon, until the run of two segments has ended.
-[[noreturn]] void Live(const std::string& path, const Bomb& planted) {
+class RunKillTest : public ::testing::TestWithParam<Engine> {
+ protected:
+  // The life of a daemon, until the run of two segments has ended.
+  [[noreturn]] static void Live(const TempFolder& folder, const Bomb& planted);
+  // Whether it was killed, rather than having reached its end.
+  static bool LiveAndDie(const TempFolder& folder, const Bomb& planted);
+  static bool OneRunGaveOneVersion(const TempFolder& folder);
+};
+SELFCAL_STORE_TEST_SUITE(RunKillTest);
+
+void RunKillTest::Live(const TempFolder& folder, const Bomb& planted) {
   bomb = planted;
-  sqlite3_auto_extension(reinterpret_cast<void (*)()>(Watch));
-  auto store = OpenSqliteStore(path);
-  if (!store.ok()) _exit(2);
-  Domain domain(store->get());
+  auto database = GetParam().open_database(folder, 0);
+  if (!database.ok()) _exit(2);
+  const auto store =
+      MakeStore(std::make_unique<DeadlyDatabase>(*std::move(database)));
+  Domain domain(store.get());
   const auto rig = domain.CreateRig(TestRig("a"));
   if (!rig.ok() && !absl::IsAlreadyExists(rig.status())) _exit(3);
   Estimators estimators;
@@ -100,15 +139,14 @@ bool Ended(Store* store) {
   for (const std::int64_t index : {0, 1}) {
     if (!pipeline->Submit("a", Segment(index), nullptr).ok()) _exit(5);
   }
-  if (!Eventually([&] { return Ended(store->get()); })) _exit(6);
+  if (!Eventually([&] { return Ended(store.get()); })) _exit(6);
   pipeline->Stop();
   _exit(0);
 }
 
-// Whether it was killed, rather than having reached its end.
-bool LiveAndDie(const std::string& path, const Bomb& planted) {
+bool RunKillTest::LiveAndDie(const TempFolder& folder, const Bomb& planted) {
   const pid_t child = fork();
-  if (child == 0) Live(path, planted);
+  if (child == 0) Live(folder, planted);
   int status = 0;
   EXPECT_EQ(waitpid(child, &status, 0), child);
   if (WIFEXITED(status)) {
@@ -119,8 +157,8 @@ bool LiveAndDie(const std::string& path, const Bomb& planted) {
   return true;
 }
 
-bool OneRunGaveOneVersion(const std::string& path) {
-  const auto store = OpenSqliteStore(path);
+bool RunKillTest::OneRunGaveOneVersion(const TempFolder& folder) {
+  const auto store = GetParam().open(folder, 0);
   if (!store.ok()) return false;
   const auto runs = (*store)->ListRuns("a", {});
   const auto versions = (*store)->ListCalibrations("a", {});
@@ -137,32 +175,34 @@ struct Counts {
   int lost = 0;
 };
 
-// Kills one life there, and lets the next go on. Whether there was one to kill.
-bool TryOnce(const Bomb& planted, Counts* counts) {
-  const TempFolder folder;
-  const std::string path = folder.File("selfcal.db");
-  if (!LiveAndDie(path, planted)) return false;
-  EXPECT_FALSE(LiveAndDie(path, {}));
-  ++counts->trials;
-  const bool kept = OneRunGaveOneVersion(path);
-  EXPECT_TRUE(kept) << "killed at commit " << planted.before_commit << " or "
-                    << planted.after_commit << ", iteration "
-                    << planted.iteration;
-  counts->lost += kept ? 0 : 1;
-  return true;
-}
-
-TEST(RunKillTest, OneRunForEachTriggerHoweverItIsKilled) {
+TEST_P(RunKillTest, OneRunForEachTriggerHoweverItIsKilled) {
 #if defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "ThreadSanitizer cannot start threads in a forked process";
 #endif
   Counts counts;
+  // Kills one life there, and lets the next go on. Whether there was one to
+  // kill.
+  const auto try_once = [&](const Bomb& planted) {
+    const TempFolder folder;
+    // What the folder stands for is created here: the child has no part in the
+    // server of an engine that has one.
+    if (!GetParam().open(folder, 0).ok()) return false;
+    if (!LiveAndDie(folder, planted)) return false;
+    EXPECT_FALSE(LiveAndDie(folder, {}));
+    ++counts.trials;
+    const bool kept = OneRunGaveOneVersion(folder);
+    EXPECT_TRUE(kept) << "killed at commit " << planted.before_commit << " or "
+                      << planted.after_commit << ", iteration "
+                      << planted.iteration;
+    counts.lost += kept ? 0 : 1;
+    return true;
+  };
   const int rounds = Trials(1);
   for (int round = 0; round < rounds; ++round) {
     int steps = 0;
-    for (int n = 1; TryOnce({n, 0, 0}, &counts); ++n) ++steps;
-    for (int n = 1; TryOnce({0, n, 0}, &counts); ++n) ++steps;
-    for (int n = 1; TryOnce({0, 0, n}, &counts); ++n) ++steps;
+    for (int n = 1; try_once({n, 0, 0}); ++n) ++steps;
+    for (int n = 1; try_once({0, n, 0}); ++n) ++steps;
+    for (int n = 1; try_once({0, 0, n}); ++n) ++steps;
     // Put and score twice, begin, candidate, finish: on both sides.
     EXPECT_GT(steps, 14);
   }

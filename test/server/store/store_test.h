@@ -13,12 +13,14 @@
 #include <vector>
 
 #include "migrations/migrations.h"
+#include "server/domain/clock.h"
 #include "server/domain/domain.h"
+#include "server/store/make_store.h"
+#include "server/store/sqlite/sqlite.h"
 #include "server/store/store.h"
 #include "test/server/store/fake_information.h"
 #include "test/server/store/postgres/postgres_cluster.h"
 #include "test/server/store/postgres/postgres_engine.h"
-#include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/store/sqlite/tamper.h"
 #include "test/server/test_segments.h"
 #include "test/support/temp_folder.h"
@@ -29,15 +31,22 @@ struct Engine {
   std::string name;
   int schema_version = 0;  // the newest
   bool limits_size = false;
-  // The store that this folder stands for, empty the first time; of at most
+  // The database that this folder stands for, empty the first time; of at most
   // this many bytes, unless 0, if the engine limits the size.
-  std::function<absl::StatusOr<std::unique_ptr<Store>>(const TempFolder&,
-                                                       std::int64_t max_bytes)>
-      open;
+  std::function<absl::StatusOr<std::unique_ptr<Database>>(
+      const TempFolder&, std::int64_t max_bytes)>
+      open_database;
   // Damages all blobs of a column, behind the back of a store that is closed.
   std::function<absl::Status(
       const TempFolder&, const std::string& table, const std::string& column)>
       damage;
+
+  absl::StatusOr<std::unique_ptr<Store>> open(const TempFolder& folder,
+                                              std::int64_t max_bytes) const {
+    auto database = open_database(folder, max_bytes);
+    if (!database.ok()) return database.status();
+    return MakeStore(*std::move(database));
+  }
 };
 
 inline std::vector<Engine> Engines() {
@@ -46,7 +55,9 @@ inline std::vector<Engine> Engines() {
        static_cast<int>(SqliteMigrations().size()),
        true,
        [](const TempFolder& folder, std::int64_t max_bytes) {
-         return OpenSqliteStore(folder.File("selfcal.db"), max_bytes);
+         return OpenSqlite({.path = folder.File("selfcal.db"),
+                            .max_bytes = max_bytes,
+                            .time_ns = NowNs()});
        },
        [](const TempFolder& folder,
           const std::string& table,
@@ -58,8 +69,10 @@ inline std::vector<Engine> Engines() {
         {.name = "Postgres",
          .schema_version = static_cast<int>(PostgresMigrations().size()),
          .limits_size = false,
-         .open = [](const TempFolder& folder,
-                    std::int64_t) { return OpenPostgresStore(folder); },
+         .open_database =
+             [](const TempFolder& folder, std::int64_t) {
+               return OpenPostgresDatabase(folder);
+             },
          .damage = DamagePostgresColumn});
   }
   return engines;

@@ -105,6 +105,13 @@ std::string DatabaseOf(const TempFolder& folder) {
   return name;
 }
 
+absl::StatusOr<std::unique_ptr<Database>> OpenShared(const TempFolder& folder) {
+  return OpenPostgres({.uri = SharedPostgres().Uri(DatabaseOf(folder)),
+                       .writers = 4,
+                       .readers = 4,
+                       .time_ns = NowNs()});
+}
+
 }  // namespace
 
 PostgresCluster& SharedPostgres() {
@@ -112,18 +119,15 @@ PostgresCluster& SharedPostgres() {
   return cluster;
 }
 
-absl::StatusOr<std::unique_ptr<Store>> OpenPostgresStore(
+absl::StatusOr<std::unique_ptr<Database>> OpenPostgresDatabase(
     const TempFolder& folder) {
   WaitForOthersToEnd(DatabaseOf(folder));
-  return OpenSharedPostgresStore(folder);
+  return OpenShared(folder);
 }
 
 absl::StatusOr<std::unique_ptr<Store>> OpenSharedPostgresStore(
     const TempFolder& folder) {
-  auto database = OpenPostgres({.uri = SharedPostgres().Uri(DatabaseOf(folder)),
-                                .writers = 4,
-                                .readers = 4,
-                                .time_ns = NowNs()});
+  auto database = OpenShared(folder);
   if (!database.ok()) return database.status();
   return MakeStore(*std::move(database));
 }

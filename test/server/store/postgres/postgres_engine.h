@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "server/store/driver/driver.h"
 #include "server/store/store.h"
 #include "test/server/store/postgres/postgres_cluster.h"
 #include "test/support/temp_folder.h"
@@ -17,11 +18,11 @@ namespace selfcal::server {
 // The server, which starts when it is first needed.
 PostgresCluster& SharedPostgres();
 
-// The store in the database that the folder stands for, which is created if the
-// folder has none yet.
-absl::StatusOr<std::unique_ptr<Store>> OpenPostgresStore(
+// The database that the folder stands for, which is created if the folder has
+// none yet.
+absl::StatusOr<std::unique_ptr<Database>> OpenPostgresDatabase(
     const TempFolder& folder);
-// The same while others are open, as by another daemon.
+// The store in it, while others are open, as by another daemon.
 absl::StatusOr<std::unique_ptr<Store>> OpenSharedPostgresStore(
     const TempFolder& folder);
 
