@@ -16,7 +16,7 @@ constexpr NoiseKind kInertialKinds[kNoiseKindsOfImu] = {
     NoiseKind::kGyroBiasWalk,
     NoiseKind::kAccelBiasWalk};
 
-constexpr std::size_t kMinObservations = 2;
+constexpr std::size_t kMinPieceObservations = 2;
 
 // Makes each piece of a track a separate landmark: the connection of distant
 // keyframes has almost no information about noise, and adds unknowns to every
@@ -29,7 +29,7 @@ std::vector<ScreenedLandmark> SplitIntoPieces(
     const Track& track = problem.tracks[whole.track];
     ScreenedLandmark part = whole;
     const auto finish = [&] {
-      if (part.used.size() >= kMinObservations) parts.push_back(part);
+      if (part.used.size() >= kMinPieceObservations) parts.push_back(part);
       part.used.clear();
     };
     part.used.clear();

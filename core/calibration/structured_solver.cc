@@ -75,7 +75,7 @@ double NextLength(double length, double rise, double slope) {
 }
 
 // A trial point of the line search, with its cost.
-struct Trial {
+struct TrialPoint {
   CalibrationEstimate estimate;
   std::vector<LandmarkPosition> positions;
   double cost = 0;
@@ -230,14 +230,14 @@ class LineSearch {
 
   // Returns the trial point of lowest cost, which may be above that of the
   // start. Further lengths are tried until one decreases the cost.
-  Trial Run() {
-    Trial best = At(1);
+  TrialPoint Run() {
+    TrialPoint best = At(1);
     length_ = 1;
     double next = Next(1, best);
     if (Lower(best) && std::abs(next - 1) <= kLengthTolerance) return best;
     for (int i = 0; i < kMaxTrials && (i == 0 || !Lower(best)); ++i) {
       const double length = next;
-      Trial trial = At(length);
+      TrialPoint trial = At(length);
       next = Next(length, trial);
       if (trial.cost < best.cost) {
         best = std::move(trial);
@@ -247,17 +247,19 @@ class LineSearch {
     return best;
   }
 
-  bool Lower(const Trial& trial) const { return trial.cost < linearised_.cost; }
+  bool Lower(const TrialPoint& trial) const {
+    return trial.cost < linearised_.cost;
+  }
   // Length of the best trial point.
   double length() const { return length_; }
 
  private:
-  double Next(double length, const Trial& trial) const {
+  double Next(double length, const TrialPoint& trial) const {
     return NextLength(length, trial.cost - linearised_.cost, direction_.slope);
   }
 
-  Trial At(double length) const {
-    Trial trial{estimate_, positions_, 0};
+  TrialPoint At(double length) const {
+    TrialPoint trial{estimate_, positions_, 0};
     trial.estimate.d += length * direction_.d;
     for (std::size_t k = 0; k < direction_.keyframes.size(); ++k) {
       KeyframeState& x = trial.estimate.keyframes[k];
@@ -294,7 +296,7 @@ StepOutcome TakeStep(const SolverRound& round,
                      CalibrationEstimate* estimate,
                      std::vector<ScreenedLandmark>* landmarks) {
   LineSearch search(round, linearised, *estimate, *landmarks);
-  Trial best = search.Run();
+  TrialPoint best = search.Run();
   double length = search.length();
   LinearisedRound damped;
   for (double damping = 1; length < kShort && damping <= kMaxDamping;
@@ -304,7 +306,7 @@ StepOutcome TakeStep(const SolverRound& round,
       break;
     }
     LineSearch damped_search(round, damped, *estimate, *landmarks);
-    Trial trial = damped_search.Run();
+    TrialPoint trial = damped_search.Run();
     length = damped_search.length();
     if (trial.cost < best.cost) best = std::move(trial);
   }
