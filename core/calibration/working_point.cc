@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "core/calibration/theta_information.h"
-
 namespace selfcal {
 WorkingPoint::WorkingPoint(const Rig& rig,
                            const Calibration& theta_start,
@@ -16,8 +14,8 @@ WorkingPoint::WorkingPoint(const Rig& rig,
       reference_(options.prior ? options.prior->centre : theta_start),
       start_d_(BoxMinus(theta_start, reference_)),
       estimate_{start_d_, problem_.keyframes},
-      subspace_(WholeSubspace(rig)),
-      loss_{.kind = options.loss, .scale = options.loss_scale} {
+      directions_(rig),
+      selection_({.kind = options.loss, .scale = options.loss_scale}) {
   SelectAfresh();
 }
 
@@ -25,10 +23,10 @@ SolverRound WorkingPoint::Round(const Eigen::MatrixXd& basis) const {
   return {.rig = rig_,
           .reference = reference_,
           .problem = problem_,
-          .motions = motions_,
-          .whitening = whitening_,
+          .motions = selection_.motions(),
+          .whitening = selection_.whitening(),
           .basis = basis,
-          .loss = screening_.loss,
+          .loss = screening().loss,
           .prior_information =
               options_.prior ? &options_.prior->information : nullptr,
           .threads = options_.threads};
@@ -45,20 +43,20 @@ ReprojectionStatistics WorkingPoint::MeasureReprojections() const {
                              theta(),
                              problem_,
                              estimate_.keyframes,
-                             motions_,
-                             screening_.landmarks);
+                             selection_.motions(),
+                             screening().landmarks);
 }
 
 double WorkingPoint::UnweightedCost() {
-  const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
-  SetTrackNoise(1, &screening_);
-  return RoundCost(Round(basis), estimate_, screening_.landmarks);
+  const Eigen::MatrixXd basis = TangentBasis(rig_, subspace());
+  SetTrackNoise(1, &selection_.screening());
+  return RoundCost(Round(basis), estimate_, screening().landmarks);
 }
 
 double WorkingPoint::StepSigmas() const {
   const SharedInformation& about = information();
-  return LargestInSigmas(SubspaceStep(rig_, subspace_, about.Lambda, about.eta),
-                         covariance_);
+  return LargestInSigmas(
+      SubspaceStep(rig_, subspace(), about.Lambda, about.eta), covariance_);
 }
 
 // All residuals are large at a start far from the optimum, so that
@@ -67,49 +65,36 @@ double WorkingPoint::StepSigmas() const {
 bool WorkingPoint::FindSubspace() {
   if (!Linearise()) return false;
   if (ChooseSubspace()) return true;
-  subspace_ = WholeSubspace(rig_);
+  directions_.Set(WholeSubspace(rig_));
   estimate_.d = start_d_;
   if (!LineariseBy(nullptr)) return false;
   ChooseSubspace();
   return Linearise();
 }
 
-void WorkingPoint::Select() { SelectFrom(&screening_); }
+void WorkingPoint::Select() { SelectAtEstimate(/*afresh=*/false); }
 
-void WorkingPoint::SelectAfresh() { SelectFrom(nullptr); }
+void WorkingPoint::SelectAfresh() { SelectAtEstimate(/*afresh=*/true); }
 
-void WorkingPoint::SelectFrom(const Screening* before) {
-  const Calibration at = theta();
-  MeasureMotions(rig_, at, problem_, estimate_.keyframes, &motions_);
-  screening_ = ScreenLandmarks(
-      rig_, at, problem_, estimate_.keyframes, motions_, loss_, before);
-  RefineOnWhatIsUsed(
-      rig_, at, problem_, estimate_.keyframes, motions_, &screening_);
-  SetTrackNoise(track_noise_factor_, &screening_);
-  whitening_ = WhitenInertialLinks(
-      rig_, ChainThetas(at, problem_), problem_, estimate_.keyframes);
+void WorkingPoint::SelectAtEstimate(bool afresh) {
+  selection_.Select(rig_, theta(), problem_, estimate_.keyframes, afresh);
 }
 
-bool WorkingPoint::Linearise() { return LineariseBy(&screening_.loss); }
+bool WorkingPoint::Linearise() { return LineariseBy(&screening().loss); }
 
 bool WorkingPoint::LineariseBy(const RobustLoss* loss) {
-  const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+  const Eigen::MatrixXd basis = TangentBasis(rig_, subspace());
   if (!LineariseRound(
-          Round(basis), estimate_, screening_.landmarks, loss, &linearised_)) {
+          Round(basis), estimate_, screening().landmarks, loss, &linearised_)) {
     return false;
   }
-  covariance_ = SubspaceCovariance(rig_, subspace_, information().Lambda);
+  covariance_ = SubspaceCovariance(rig_, subspace(), information().Lambda);
   return covariance_.allFinite();
 }
 
 bool WorkingPoint::ChooseSubspace() {
-  const auto held = static_cast<int>(subspace_.held.cols());
-  const int least_held = std::exchange(reweighted_, false) ? 0 : held;
-  ThetaSubspace observed =
-      assessed_ ? HoldDirections(rig_, information().Lambda, subspace_.held)
-                : ObservedSubspace(
-                      rig_, information().Lambda, least_held, kWeakInformation);
-  const bool same = observed.held.cols() == held;
+  ThetaSubspace observed = directions_.Choose(rig_, information().Lambda);
+  const bool same = observed.held.cols() == subspace().held.cols();
   if (!same) Hold(std::move(observed));
   return same;
 }
@@ -123,15 +108,16 @@ bool WorkingPoint::RepeatSelection() {
 }
 
 void WorkingPoint::Hold(ThetaSubspace subspace) {
-  subspace_ = std::move(subspace);
+  directions_.Set(std::move(subspace));
+  const ThetaSubspace& chosen = directions_.subspace();
   estimate_.d =
-      start_d_ + ProjectOnSubspace(rig_, subspace_, estimate_.d - start_d_);
-  covariance_ = SubspaceCovariance(rig_, subspace_, information().Lambda);
+      start_d_ + ProjectOnSubspace(rig_, chosen, estimate_.d - start_d_);
+  covariance_ = SubspaceCovariance(rig_, chosen, information().Lambda);
 }
 
 bool WorkingPoint::HoldAssessed(ThetaSubspace subspace) {
   Hold(std::move(subspace));
-  assessed_ = true;
+  directions_.SetAssessed();
   Select();
   return Linearise();
 }
@@ -144,30 +130,33 @@ void WorkingPoint::WeightByNoise(const Rig& rig, double residuals) {
                              rig_.imu_noise.gyro_bias_random_walk;
   }
   rig_ = rig;
-  loss_.scale = options_.loss_scale * residuals;
-  reweighted_ = true;
+  selection_.SetLossScale(options_.loss_scale * residuals);
+  directions_.SetReweighted();
   WeightByTracks(1);
 }
 
 void WorkingPoint::WeightByTracks(double track_noise_factor) {
-  track_noise_factor_ = track_noise_factor;
-  SetTrackNoise(track_noise_factor, &screening_);
+  selection_.SetTrackNoiseFactor(track_noise_factor);
 }
 
 StepOutcome WorkingPoint::Step() {
-  const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
-  return TakeStep(Round(basis), linearised_, &estimate_, &screening_.landmarks);
+  const Eigen::MatrixXd basis = TangentBasis(rig_, subspace());
+  return TakeStep(
+      Round(basis), linearised_, &estimate_, &selection_.screening().landmarks);
 }
 
 SolverOutcome WorkingPoint::SolveRound(int max_iterations,
                                        double tolerance,
                                        const SolverCallback& callback) {
-  const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+  const Eigen::MatrixXd basis = TangentBasis(rig_, subspace());
   SolverRound round = Round(basis);
   round.max_iterations = max_iterations;
   round.function_tolerance = tolerance;
-  return selfcal::SolveRound(
-      options_.solver, round, callback, &estimate_, &screening_.landmarks);
+  return selfcal::SolveRound(options_.solver,
+                             round,
+                             callback,
+                             &estimate_,
+                             &selection_.screening().landmarks);
 }
 
 }  // namespace selfcal

@@ -5,10 +5,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/calibration/estimated_directions.h"
 #include "core/calibration/problem.h"
+#include "core/calibration/round_selection.h"
 #include "core/calibration/screening.h"
 #include "core/calibration/solver.h"
 #include "core/calibration/structured_solver.h"
@@ -17,11 +18,6 @@
 #include "core/model/rig.h"
 
 namespace selfcal {
-
-// Threshold in units of the prior. Directions with less information from the
-// data are held constant until all others are estimated: from a poor start, the
-// estimate would move along them out of the range of the linearisation.
-inline constexpr double kWeakInformation = 100;
 
 class WorkingPoint {
  public:
@@ -37,9 +33,9 @@ class WorkingPoint {
   const Calibration& reference() const { return reference_; }
   Calibration theta() const { return BoxPlus(reference_, estimate_.d); }
   const CalibrationEstimate& estimate() const { return estimate_; }
-  const ThetaSubspace& subspace() const { return subspace_; }
-  const Screening& screening() const { return screening_; }
-  double track_noise_factor() const { return track_noise_factor_; }
+  const ThetaSubspace& subspace() const { return directions_.subspace(); }
+  const Screening& screening() const { return selection_.screening(); }
+  double track_noise_factor() const { return selection_.track_noise_factor(); }
   LinearisedRound& linearised() { return linearised_; }
   const LinearisedRound& linearised() const { return linearised_; }
   // Information about the offset d, prior included, and covariance of d.
@@ -91,7 +87,7 @@ class WorkingPoint {
                            const SolverCallback& callback);
 
  private:
-  void SelectFrom(const Screening* before);
+  void SelectAtEstimate(bool afresh);
   bool LineariseBy(const RobustLoss* loss);
   void Hold(ThetaSubspace subspace);
 
@@ -101,16 +97,8 @@ class WorkingPoint {
   Calibration reference_;
   Eigen::VectorXd start_d_;
   CalibrationEstimate estimate_;
-  ThetaSubspace subspace_;
-  bool assessed_ = false;  // the subspace, by HoldAssessed
-  // Since the subspace was chosen: directions that it holds may be observed
-  // with the new weights.
-  bool reweighted_ = false;
-  KeyframeMotions motions_;
-  Screening screening_;
-  RobustLoss loss_;  // each selection finds its gate
-  double track_noise_factor_ = 1;
-  std::vector<InertialMatrix> whitening_;
+  EstimatedDirections directions_;
+  RoundSelection selection_;
   LinearisedRound linearised_;
   Eigen::MatrixXd covariance_;
 };
