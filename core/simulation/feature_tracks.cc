@@ -1,8 +1,10 @@
 #include "core/simulation/feature_tracks.h"
 
-#include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "core/simulation/pixel_errors.h"
+#include "core/simulation/point_views.h"
 #include "core/simulation/random.h"
 #include "core/simulation/streams.h"
 
@@ -14,21 +16,6 @@ constexpr int kRevisitAttempts = 30;
 // Number of keyframes after which a landmark is out of sight: a track that
 // ended does not resume.
 constexpr int kRevisitPause = 10;
-// A tracked landmark may come nearer, or move farther, than the depths of new
-// ones by this factor.
-constexpr double kDepthSlack = 2;
-// A point that keeps up with the rows of a rolling shutter is in many of them:
-// it is not observed.
-constexpr int kMaxRowIterations = 50;
-constexpr double kRowConverged_px = 1e-9;
-// Largest scale of the errors of a track, in sigmas: the checks of a tracker
-// end patches that are worse.
-constexpr double kLargestScale = 50;
-
-bool InsideImage(const CameraCalibration& camera, const Eigen::Vector2d& z_px) {
-  return z_px.x() >= 0 && z_px.y() >= 0 && z_px.x() <= camera.width_px - 1 &&
-         z_px.y() <= camera.height_px - 1;
-}
 
 Eigen::Vector2d RandomPixel(const CameraCalibration& camera, Random* random) {
   const double x = random->Uniform(0, camera.width_px - 1);
@@ -36,18 +23,15 @@ Eigen::Vector2d RandomPixel(const CameraCalibration& camera, Random* random) {
   return {x, y};
 }
 
-// Errors of a track in one camera, in sigmas.
-struct TrackError {
-  int keyframe = -2;  // of the last observation
-  Eigen::Vector2d drift = Eigen::Vector2d::Zero();
-  Eigen::Vector2d common = Eigen::Vector2d::Zero();
-  double scale = 1;
-};
-
-// The first observation of a landmark.
-struct Birth {
-  int keyframe = 0;
-  int camera = 0;
+// How the cameras have observed a landmark, and how it moves.
+struct Sighting {
+  // The keyframe and the camera of its first observation.
+  int created_keyframe = 0;
+  int created_camera = 0;
+  Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();
+  int trackers = 0;    // number of cameras that track it
+  int last_seen = -1;  // keyframe
+  int begun = 0;       // keyframe at which its present track began
 };
 
 class Tracker {
@@ -57,31 +41,24 @@ class Tracker {
           const Exposures& exposures,
           const Exposures& closed,
           const SimulationOptions& options)
-      : theta_(theta),
-        exposures_(exposures),
-        closed_(closed),
-        options_(options),
-        pixel_sigma_px_(options.noise ? pixel_sigma_px : 0),
+      : options_(options),
+        views_(theta, exposures, options),
+        errors_(pixel_sigma_px, views_.cameras(), options),
+        blur_({theta, closed, options}, options),
         random_(options.seed, kTrackStream),
-        noise_(options.seed, kPixelNoiseStream),
         outliers_(options.seed, kOutlierStream),
         moving_(options.seed, kMovingLandmarkStream),
-        blur_(options.seed, kBlurStream),
-        patches_(options.seed, kPatchStream),
-        tracked_(theta.cameras.size()),
-        errors_(theta.cameras.size()) {}
+        tracked_(theta.cameras.size()) {}
 
   void Step(int keyframe) {
     keyframe_ = keyframe;
-    for (int j = 0; j < cameras(); ++j) Continue(j);
-    for (int j = 0; j < cameras(); ++j) Refill(j);
+    for (int j = 0; j < views_.cameras(); ++j) Continue(j);
+    for (int j = 0; j < views_.cameras(); ++j) Refill(j);
   }
 
   FeatureTracks Take() && { return std::move(tracks_); }
 
  private:
-  int cameras() const { return static_cast<int>(theta_.cameras.size()); }
-
   // Observes the landmarks again in each camera that tracks them, and ends
   // tracks at random, at the border of the image and beyond the depth range.
   void Continue(int camera) {
@@ -89,11 +66,11 @@ class Tracker {
     for (const int landmark : tracked_[camera]) {
       const bool continues =
           !random_.Chance(1 / options_.mean_track_length) &&
-          keyframe_ - begun_[landmark] < options_.max_track_length;
+          keyframe_ - sightings_[landmark].begun < options_.max_track_length;
       if (continues && Observe(camera, landmark)) {
         kept.push_back(landmark);
       } else {
-        --trackers_[landmark];
+        --sightings_[landmark].trackers;
       }
     }
     tracked_[camera] = std::move(kept);
@@ -121,9 +98,10 @@ class Tracker {
       const auto landmark =
           static_cast<int>(random_.Index(tracks_.landmarks_G.size()));
       Eigen::Vector2d z_px;
-      if (trackers_[landmark] == 0 &&
-          keyframe_ - last_seen_[landmark] > kRevisitPause &&
-          Sees(camera, landmark, &z_px)) {
+      if (sightings_[landmark].trackers == 0 &&
+          keyframe_ - sightings_[landmark].last_seen > kRevisitPause &&
+          views_.Sees(
+              camera, keyframe_, tracks_.landmarks_G[landmark], &z_px)) {
         return landmark;
       }
     }
@@ -133,22 +111,17 @@ class Tracker {
   // Creates a landmark at a random pixel, its depth uniform in the logarithm;
   // returns -1 if no point projects to the pixel.
   int Create(int camera) {
-    const CameraCalibration& c = theta_.cameras[camera];
-    const Eigen::Vector2d z_px = RandomPixel(c, &random_);
+    const Eigen::Vector2d z_px = RandomPixel(views_.camera(camera), &random_);
     const double depth_m = options_.min_depth_m *
                            std::pow(options_.max_depth_m / options_.min_depth_m,
                                     random_.Uniform());
-    Eigen::Vector3d bearing_C;
-    if (!Unproject(c, z_px, &bearing_C)) return -1;
-    const Eigen::Vector3d p_I =
-        c.q_CI.conjugate() * (depth_m * bearing_C - c.p_CI);
-    const KeyframeState x = exposures_.At(camera, keyframe_, z_px.y());
-    tracks_.landmarks_G.push_back(x.q_GI * p_I + x.p_GI);
-    trackers_.push_back(0);
-    last_seen_.push_back(-1);
-    begun_.push_back(keyframe_);
-    made_.push_back({keyframe_, camera});
-    velocities_mps_.push_back(DrawVelocity());
+    Eigen::Vector3d p_G;
+    if (!views_.PointAt(camera, keyframe_, z_px, depth_m, &p_G)) return -1;
+    tracks_.landmarks_G.push_back(p_G);
+    sightings_.push_back({.created_keyframe = keyframe_,
+                          .created_camera = camera,
+                          .velocity_mps = DrawVelocity(),
+                          .begun = keyframe_});
     return static_cast<int>(tracks_.landmarks_G.size()) - 1;
   }
 
@@ -166,148 +139,62 @@ class Tracker {
   // Begins a track in this camera, and in every other one that observes the
   // landmark and does not have enough.
   void Begin(int camera, int landmark) {
-    begun_[landmark] = keyframe_;
-    for (int j = 0; j < cameras(); ++j) {
+    sightings_[landmark].begun = keyframe_;
+    for (int j = 0; j < views_.cameras(); ++j) {
       const bool wants =
           static_cast<int>(tracked_[j].size()) < options_.landmarks_in_view;
       if ((j == camera || wants) && Observe(j, landmark)) {
         tracked_[j].push_back(landmark);
-        ++trackers_[landmark];
+        ++sightings_[landmark].trackers;
       }
     }
-  }
-
-  // Computes the true pixel of a landmark. Returns false if the camera does not
-  // observe it.
-  bool Sees(int camera, int landmark, Eigen::Vector2d* z_px) const {
-    return SeesPoint(exposures_, camera, tracks_.landmarks_G[landmark], z_px);
-  }
-
-  bool SeesPoint(const Exposures& exposures,
-                 int camera,
-                 const Eigen::Vector3d& p_G,
-                 Eigen::Vector2d* z_px) const {
-    const CameraCalibration& c = theta_.cameras[camera];
-    double row_px = c.height_px / 2.0;
-    // A rolling shutter sees the point in the row at whose exposure it is
-    // there.
-    for (int i = 0; i < kMaxRowIterations; ++i) {
-      const KeyframeState x = exposures.At(camera, keyframe_, row_px);
-      const Eigen::Vector3d p_I = x.q_GI.conjugate() * (p_G - x.p_GI);
-      const Eigen::Vector3d p_C = c.q_CI * p_I + c.p_CI;
-      const double depth_m = p_C.norm();
-      if (!(depth_m > options_.min_depth_m / kDepthSlack &&
-            depth_m < options_.max_depth_m * kDepthSlack &&
-            Project(c, p_C, z_px, nullptr) && InsideImage(c, *z_px))) {
-        return false;
-      }
-      if (!exposures.IsRolling(camera) ||
-          std::abs(z_px->y() - row_px) < kRowConverged_px) {
-        return true;
-      }
-      row_px = z_px->y();
-    }
-    return false;
-  }
-
-  // Error of the next pixel of a track, in sigmas: a first-order autoregressive
-  // process, and what is common to the track.
-  Eigen::Vector2d NextError(int camera, int landmark) {
-    std::vector<TrackError>& errors = errors_[camera];
-    if (errors.size() < begun_.size()) errors.resize(begun_.size());
-    TrackError& track = errors[landmark];
-    const double dx = noise_.Normal();
-    const double dy = noise_.Normal();
-    const Eigen::Vector2d drawn(dx, dy);
-    if (track.keyframe == keyframe_ - 1) {
-      const double rho = options_.pixel_correlation;
-      track.drift = rho * track.drift + std::sqrt(1 - rho * rho) * drawn;
-    } else {
-      track.drift = drawn;
-      DrawPatch(&track);
-    }
-    track.keyframe = keyframe_;
-    if (options_.pixel_shared == 0) return track.scale * track.drift;
-    const Birth& made = made_[landmark];
-    if (made.keyframe == keyframe_ && made.camera == camera) {
-      return Eigen::Vector2d::Zero();
-    }
-    return track.scale * (std::sqrt(options_.pixel_shared) * track.common +
-                          std::sqrt(1 - options_.pixel_shared) * track.drift);
-  }
-
-  // What the errors of a new track have in common.
-  void DrawPatch(TrackError* track) {
-    const double dx = patches_.Normal();
-    const double dy = patches_.Normal();
-    track->common = {dx, dy};
-    const double freedom = options_.pixel_freedom;
-    if (freedom == 0) return;
-    do {
-      track->scale = std::sqrt(0.5 * freedom / patches_.Gamma(0.5 * freedom));
-    } while (!(track->scale <= kLargestScale));
-  }
-
-  // Error of the pixel of a point that moves in the image during the exposure,
-  // along its motion. A point that leaves the image meanwhile is not blurred.
-  Eigen::Vector2d BlurError(int camera,
-                            const Eigen::Vector3d& p_G,
-                            const Eigen::Vector2d& z_px) {
-    Eigen::Vector2d end_px;
-    if (options_.exposure_s <= 0 || !options_.noise ||
-        !SeesPoint(closed_, camera, p_G, &end_px)) {
-      return Eigen::Vector2d::Zero();
-    }
-    return options_.blur_error * blur_.Normal() * (end_px - z_px);
   }
 
   // Adds the observation unless its pixel, before or after noise, is outside.
   bool Observe(int camera, int landmark) {
-    const CameraCalibration& c = theta_.cameras[camera];
+    const CameraCalibration& c = views_.camera(camera);
+    Sighting& sighting = sightings_[landmark];
+    const Eigen::Vector3d& start_G = tracks_.landmarks_G[landmark];
     FeatureObservation observation;
     observation.keyframe = keyframe_;
     observation.camera = camera;
     observation.landmark = landmark;
-    if (!Sees(camera, landmark, &observation.true_px)) return false;
-    const double moved_s =
-        (keyframe_ - made_[landmark].keyframe) / options_.keyframe_rate_hz;
-    const Eigen::Vector3d p_G =
-        tracks_.landmarks_G[landmark] + moved_s * velocities_mps_[landmark];
-    if (!SeesPoint(exposures_, camera, p_G, &observation.measured_px)) {
+    if (!views_.Sees(camera, keyframe_, start_G, &observation.true_px)) {
       return false;
     }
-    observation.measured_px += pixel_sigma_px_ * NextError(camera, landmark) +
-                               BlurError(camera, p_G, observation.measured_px);
+    const double moved_s =
+        (keyframe_ - sighting.created_keyframe) / options_.keyframe_rate_hz;
+    const Eigen::Vector3d p_G = start_G + moved_s * sighting.velocity_mps;
+    if (!views_.Sees(camera, keyframe_, p_G, &observation.measured_px)) {
+      return false;
+    }
+    const bool is_first = sighting.created_keyframe == keyframe_ &&
+                          sighting.created_camera == camera;
+    const Eigen::Vector2d error_px =
+        errors_.Next(camera, landmark, keyframe_, is_first);
+    observation.measured_px +=
+        error_px + blur_.Next(camera, keyframe_, p_G, observation.measured_px);
     if (!InsideImage(c, observation.measured_px)) return false;
     const Eigen::Vector2d elsewhere = RandomPixel(c, &outliers_);
     if (outliers_.Chance(options_.outlier_fraction)) {
       observation.measured_px = elsewhere;
     }
-    last_seen_[landmark] = keyframe_;
+    sighting.last_seen = keyframe_;
     tracks_.observations.push_back(observation);
     return true;
   }
 
-  const Calibration& theta_;
-  const Exposures& exposures_;
-  const Exposures& closed_;
   const SimulationOptions& options_;
-  const double pixel_sigma_px_;
+  PointViews views_;
+  PixelErrors errors_;
+  BlurErrors blur_;
   Random random_;
-  Random noise_;
   Random outliers_;
   Random moving_;
-  Random blur_;
-  Random patches_;
   int keyframe_ = 0;
   FeatureTracks tracks_;
-  std::vector<std::vector<int>> tracked_;        // landmarks in each camera
-  std::vector<std::vector<TrackError>> errors_;  // of these landmarks
-  std::vector<int> trackers_;   // for each landmark: cameras that track it
-  std::vector<int> last_seen_;  // for each landmark: keyframe, or -1
-  std::vector<int> begun_;      // for each landmark: keyframe
-  std::vector<Birth> made_;     // for each landmark
-  std::vector<Eigen::Vector3d> velocities_mps_;  // for each landmark
+  std::vector<Sighting> sightings_;        // by landmark
+  std::vector<std::vector<int>> tracked_;  // landmarks in each camera
 };
 
 }  // namespace
