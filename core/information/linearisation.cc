@@ -89,36 +89,6 @@ ChainStateMatrix GaugePrior(const KeyframeState& x, int size) {
   return prior;
 }
 
-void SegmentLineariser::FindTracks(const MotionSegment& segment,
-                                   const InlierSelection& selection,
-                                   const ObservationOrder& order) {
-  points_.resize(4 * selection.landmarks.size());
-  for (std::size_t m = 0; m < selection.landmarks.size(); ++m) {
-    Eigen::Vector4d::Map(&points_[4 * m]) =
-        selection.landmarks[m].homogeneous();
-  }
-  tracks_.clear();
-  track_keyframes_.clear();
-  factor_of_observation_.assign(segment.observations.size(), -1);
-  int landmark = -1;
-  for (const int index : selection.inliers) {
-    const Observation& o = segment.observations[index];
-    const int factor = static_cast<int>(track_keyframes_.size());
-    if (o.landmark != landmark) tracks_.push_back(factor);
-    landmark = o.landmark;
-    factor_of_observation_[index] = factor;
-    track_keyframes_.push_back(o.keyframe);
-  }
-  tracks_.push_back(static_cast<int>(track_keyframes_.size()));
-  runs_.Select(segment, order.ByView(), [&](int index) {
-    return factor_of_observation_[index] >= 0;
-  });
-  factors_.clear();
-  for (const int index : runs_.indices()) {
-    factors_.push_back(factor_of_observation_[index]);
-  }
-}
-
 // Calls use(run, arrays, rows) for the rows of each keyframe and camera, while
 // they are in the cache.
 template <typename Use>
@@ -127,14 +97,15 @@ void SegmentLineariser::LineariseViews(const Rig& rig,
                                        const MotionSegment& segment,
                                        const KeyframeMotions& motions,
                                        const Use& use) {
-  for (const ObservationRuns::Run& run : runs_.runs()) {
+  for (const ObservationRuns::Run& run : inliers_.runs().runs()) {
     // The kernels may write a whole vector past the last element.
     const std::size_t rows = 2 * (run.end - run.begin + kPanelPad);
     const std::size_t size = rows * RowsOf(theta0.cameras[run.camera]).stride();
     if (rows_.size() < size) rows_.resize(size);
-    const ObservationRun arrays = runs_.Arrays(run, segment, theta0, motions);
+    const ObservationRun arrays =
+        inliers_.runs().Arrays(run, segment, theta0, motions);
     reprojection_.Linearise(
-        arrays, points_.data(), rig.pixel_sigma_px, nullptr, rows_.data());
+        arrays, inliers_.points(), rig.pixel_sigma_px, nullptr, rows_.data());
     use(run, arrays, rows_.data());
   }
 }
@@ -166,7 +137,7 @@ void SegmentLineariser::LineariseAlone(const Rig& rig,
                                        const KeyframeMotions& motions,
                                        const InlierSelection& selection,
                                        const ObservationOrder& order) {
-  FindTracks(segment, selection, order);
+  inliers_.Find(segment, selection, order);
   LineariseViews(rig, theta0, segment, motions, [](const auto&...) {});
   LineariseLinks(rig, theta0, segment);
 }
@@ -182,12 +153,12 @@ void SegmentLineariser::StartChain(const Rig& rig,
   for (const CameraCalibration& camera : theta0.cameras) {
     cameras_.push_back(RowsOf(camera));
   }
-  FindTracks(segment, selection, order);
+  inliers_.Find(segment, selection, order);
   elimination_.Start({.keyframes = static_cast<int>(segment.keyframes.size()),
                       .link_size = LinkTangentSize(theta0),
                       .cameras = cameras_,
-                      .tracks = tracks_,
-                      .track_keyframes = track_keyframes_,
+                      .tracks = inliers_.tracks(),
+                      .track_keyframes = inliers_.keyframes(),
                       .kept = kept,
                       .motion_size = StateTangentSize(theta0) - kChainPoseSize,
                       .max_bytes = kMaxTrackBytes});
@@ -199,17 +170,15 @@ void SegmentLineariser::StartChain(const Rig& rig,
                      const ObservationRun& arrays,
                      const double* rows) {
                    const auto turn = PoseTurn(arrays);
-                   elimination_.AddObservations(
-                       run.keyframe,
-                       run.camera,
-                       rows,
-                       std::span<const int>(factors_).subspan(
-                           run.begin, run.end - run.begin),
-                       turn ? &*turn : nullptr);
+                   elimination_.AddObservations(run.keyframe,
+                                                run.camera,
+                                                rows,
+                                                inliers_.FactorsOf(run),
+                                                turn ? &*turn : nullptr);
                  });
   const Eigen::Matrix3d landmark_prior =
       Information(kLandmarkPriorSigma_m) * Eigen::Matrix3d::Identity();
-  for (std::size_t m = 0; m + 1 < tracks_.size(); ++m) {
+  for (std::size_t m = 0; m + 1 < inliers_.tracks().size(); ++m) {
     elimination_.AddLandmarkPrior(
         static_cast<int>(m), landmark_prior, Eigen::Vector3d::Zero());
   }

@@ -9,6 +9,7 @@
 #include "core/factor/keyframe_motion.h"
 #include "core/factor/link_batch.h"
 #include "core/factor/reprojection_batch.h"
+#include "core/information/inlier_tracks.h"
 #include "core/information/inliers.h"
 #include "core/information/observation_order.h"
 #include "core/model/calibration.h"
@@ -72,9 +73,6 @@ class SegmentLineariser {
                       const ObservationOrder& order);
 
  private:
-  void FindTracks(const MotionSegment& segment,
-                  const InlierSelection& selection,
-                  const ObservationOrder& order);
   template <typename Use>
   void LineariseViews(const Rig& rig,
                       const Calibration& theta0,
@@ -98,14 +96,9 @@ class SegmentLineariser {
   ChainElimination elimination_;
   LinearisedSegment result_;
 
-  ObservationRuns runs_;
-  std::vector<double> points_;  // homogeneous p_G of the landmarks, 4 each
+  InlierTracks inliers_;
   std::vector<LandmarkRows> cameras_;
-  // Inliers in the order of the elimination: by landmark.
-  std::vector<int> tracks_, track_keyframes_;
-  std::vector<int> factor_of_observation_;  // -1 for an outlier
-  std::vector<int> factors_;                // by view
-  std::vector<double> rows_;                // of one run
+  std::vector<double> rows_;  // of one run
   LinksOfImus links_;
   LinkTransitions transitions_;
 };
