@@ -306,7 +306,12 @@ bool SegmentBuilder::SetTheta(const Calibration& theta) noexcept {
 }
 
 void SegmentBuilder::SetHealthy(bool healthy) noexcept {
-  if (state_ != nullptr) state_->SetHealthy(healthy);
+  if (state_ == nullptr) return;
+  try {
+    state_->SetHealthy(healthy);
+  } catch (...) {
+    state_->GiveUp();
+  }
 }
 
 bool SegmentBuilder::SetTemperature(

@@ -57,6 +57,33 @@ TEST(NoMemory, NoCallOfTheBuilderThrowsAndItGoesOn) {
   EXPECT_GT(failures, 100);
 }
 
+// Its samples have come, but not those around it: what ends is closed as it is.
+TEST(NoMemory, TheEndOfHealthDoesNotThrow) {
+  const std::vector<KeyframeObservation> seen = {{0, 1}, {0, 2}, {0, 3}};
+  int failures = 0;
+  for (int allocation = 0;; ++allocation) {
+    ASSERT_LT(allocation, 1'000);
+    SegmentBuilder builder({.session = "s", .keyframes = 6});
+    constexpr std::int64_t kStep_ns = 100'000'000;
+    for (std::int64_t t_ns = 1; t_ns <= 6 * kStep_ns + 1; t_ns += 10'000'000) {
+      builder.AddImu({t_ns});
+    }
+    for (std::int64_t k = 0; k < 7; ++k) {
+      KeyframeState state;
+      state.t_ns = kStep_ns * k + 1;
+      ASSERT_TRUE(builder.AddKeyframe(state, seen));
+    }
+    ASSERT_FALSE(builder.TakeClosed().has_value());
+    const bool failed = Fails(allocation, [&] { builder.SetHealthy(false); });
+    EXPECT_EQ(builder.statistics().out_of_memory, failed ? 1u : 0u);
+    EXPECT_EQ(builder.TakeClosed().has_value(), !failed);
+    EXPECT_FALSE(builder.AddKeyframe({}, seen)) << "it is not healthy";
+    if (!failed) break;
+    ++failures;
+  }
+  EXPECT_GE(failures, 2) << "its keyframes and its samples";
+}
+
 TEST(NoMemory, WhatWasMovedFromRefuses) {
   SegmentBuilder builder({.session = "s"});
   const SegmentBuilder other(std::move(builder));
