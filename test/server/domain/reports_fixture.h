@@ -12,6 +12,7 @@
 
 #include "selfcal/store/report.pb.h"
 #include "server/store/outbox.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/store/store_test.h"
 #include "test/server/test_records.h"
 
