@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "server/domain/alarms.h"
+#include "server/domain/clock.h"
 #include "server/metrics/gauge.h"
 #include "server/pipeline/verdict.h"
 #include "server/store/outbox.h"
@@ -119,6 +121,30 @@ void AddUplink(Store* store,
   families->push_back(time.Take());
 }
 
+// The rigs that devices report to this hub, all together: there are many.
+void AddHub(Store* store, std::vector<MetricFamily>* families) {
+  Gauge rigs("selfcal_hub_rigs", "Rigs that devices report to this hub.");
+  Gauge silent("selfcal_hub_silent_rigs",
+               "Rigs of which the hub has taken no report for a day.");
+  Gauge waiting("selfcal_hub_waiting_records",
+                "Records that waited at the devices at their last reports.");
+  Gauge oldest("selfcal_hub_oldest_report_timestamp_seconds",
+               "Earliest time of the last reports of all rigs; 0: none.");
+  Gauge newest("selfcal_hub_newest_report_timestamp_seconds",
+               "Latest time of the last reports of all rigs; 0: none.");
+  const auto count = store->CountReported(NowNs() - kSilentAfterNs);
+  if (count.ok()) {
+    rigs.Add({}, static_cast<double>(count->rigs));
+    silent.Add({}, static_cast<double>(count->silent));
+    waiting.Add({}, static_cast<double>(count->waiting));
+    oldest.Add({}, Timestamp(count->oldest_ns));
+    newest.Add({}, Timestamp(count->newest_ns));
+  }
+  for (Gauge* gauge : {&rigs, &silent, &waiting, &oldest, &newest}) {
+    families->push_back(gauge->Take());
+  }
+}
+
 void AddDisk(const std::filesystem::path& database,
              std::vector<MetricFamily>* families) {
   Gauge bytes("selfcal_database_bytes", "Size of the database files.");
@@ -166,6 +192,7 @@ std::vector<MetricFamily> StateMetrics::Collect() const {
                       AddTimes(store_, rigs, &families);
                       AddQueue(store_, &families);
                       AddUplink(store_, rigs, &families);
+                      AddHub(store_, &families);
                       if (!database_.empty()) AddDisk(database_, &families);
                       AddMemory(&families);
                       return families;

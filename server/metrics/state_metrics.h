@@ -1,5 +1,6 @@
 // Metrics of the present state, when Prometheus reads them: tables, versions
-// and times of the rigs that sent last, the queue, disk and memory.
+// and times of the rigs that sent last, the queue, what devices have reported,
+// disk and memory.
 #pragma once
 
 #include <prometheus/collectable.h>

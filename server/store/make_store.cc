@@ -19,8 +19,8 @@
 #include "server/store/outbox.h"
 #include "server/store/payload.h"
 #include "server/store/replicas.h"
-#include "server/store/reporting_device.h"
 #include "server/store/report_check.h"
+#include "server/store/reporting_device.h"
 #include "server/store/rig_lists.h"
 #include "server/store/rig_work.h"
 #include "server/store/rigs.h"
@@ -327,6 +327,13 @@ class DatabaseStore final : public Store {
                           std::int64_t kept_ns) override {
     return WriteInTransaction(db_.get(), [&](Connection* db) {
       return WriteEndOfReports(db, key, attempt, now_ns, kept_ns);
+    });
+  }
+
+  absl::StatusOr<ReportedCount> CountReported(
+      std::int64_t silent_before_ns) override {
+    return Read([&](Connection* db) {
+      return CountReportedRows(db, silent_before_ns);
     });
   }
 

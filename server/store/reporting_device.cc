@@ -100,4 +100,20 @@ absl::Status WriteEndOfReports(Connection* db,
   return PutEndOfReports(db, key, attempt, now_ns).status();
 }
 
+absl::StatusOr<Store::ReportedCount> CountReportedRows(
+    Connection* db, std::int64_t silent_before_ns) {
+  // Without the cast, a sum of PostgreSQL is a decimal.
+  Statement read(db,
+                 "SELECT count(*), count(*) FILTER (WHERE time_ns < ?1), "
+                 "  CAST(sum(waiting) AS BIGINT), min(time_ns), max(time_ns) "
+                 "FROM reported_rigs",
+                 silent_before_ns);
+  Store::ReportedCount count;
+  if (read.Next()) {
+    count = {read.Int(0), read.Int(1), read.Int(2), read.Int(3), read.Int(4)};
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return count;
+}
+
 }  // namespace selfcal::server

@@ -54,4 +54,8 @@ absl::Status WriteEndOfReports(Connection* db,
                                std::int64_t now_ns,
                                std::int64_t kept_ns);
 
+// Store::CountReported.
+absl::StatusOr<Store::ReportedCount> CountReportedRows(
+    Connection* db, std::int64_t silent_before_ns);
+
 }  // namespace selfcal::server

@@ -536,6 +536,17 @@ class Store {
                                   std::int64_t attempt,
                                   std::int64_t now_ns,
                                   std::int64_t kept_ns) = 0;
+  // The rigs that devices report, by the last report of each.
+  struct ReportedCount {
+    std::int64_t rigs = 0;
+    std::int64_t silent = 0;     // without a report since the time asked for
+    std::int64_t waiting = 0;    // records that were still to be reported then
+    std::int64_t oldest_ns = 0;  // time of the oldest last report; 0: none
+    std::int64_t newest_ns = 0;
+  };
+  // Reads a row of each of them: 15 to 40 ms for 100,000 rigs.
+  virtual absl::StatusOr<ReportedCount> CountReported(
+      std::int64_t silent_before_ns) = 0;
 
   // --- The clock of the device, of which there is one record.
   // nullopt before the first is written.

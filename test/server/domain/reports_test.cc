@@ -116,6 +116,39 @@ TEST_P(ReportsTest, HubThatMissesOneReportIsToldAllOfThem) {
   ExpectSame("a");
 }
 
+TEST_P(ReportsTest, ReportedRigsAreCountedByTheirLastReports) {
+  constexpr std::int64_t kTime = 1'700'000'000'000'000'000;
+  const auto none = store_->CountReported(kTime);
+  ASSERT_TRUE(none.ok()) << none.status();
+  EXPECT_EQ(none->rigs, 0);
+  EXPECT_EQ(none->waiting, 0);
+  EXPECT_EQ(none->newest_ns, 0);
+  CreateTestRig("of_the_hub");
+  CreateDeviceRig("a");
+  CreateDeviceRig("b");
+  ReportNewRigs(ReportedData::kNone);
+  const auto rigs = device_->outbox()->List();
+  ASSERT_THAT(*rigs, SizeIs(2));
+  for (const ReportedRig& rig : *rigs) {
+    auto report = device_->outbox()->Next(rig, kLarge);
+    ASSERT_TRUE(report.ok()) << report.status();
+    now_ns_ = rig.rig == "a" ? kTime : kTime + 10;
+    report->waiting = rig.rig == "a" ? 2 : 7;
+    ASSERT_TRUE(Give(*report).ok());
+  }
+  const auto both = store_->CountReported(kTime + 1);
+  ASSERT_TRUE(both.ok()) << both.status();
+  EXPECT_EQ(both->rigs, 2);
+  EXPECT_EQ(both->silent, 1);
+  EXPECT_EQ(both->waiting, 9);
+  EXPECT_EQ(both->oldest_ns, kTime);
+  EXPECT_EQ(both->newest_ns, kTime + 10);
+  EXPECT_EQ(store_->CountReported(kTime)->silent, 0);
+  ASSERT_TRUE(domain_->DeleteRig("a", "eve", "trial").ok());
+  EXPECT_EQ(store_->CountReported(kTime + 1)->rigs, 1);
+  EXPECT_EQ(store_->CountReported(kTime + 1)->silent, 0);
+}
+
 TEST_P(ReportsTest, DeviceChangesAreReported) {
   CreateDeviceRig("a");
   ReportAll();

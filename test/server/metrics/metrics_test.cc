@@ -5,8 +5,10 @@
 
 #include <ctime>
 
+#include "server/domain/clock.h"
 #include "server/domain/domain.h"
 #include "server/store/change_rows.h"
+#include "server/store/reporting_device.h"
 #include "test/server/http_get.h"
 #include "test/server/store/fake_information.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
@@ -174,6 +176,38 @@ TEST_F(MetricsTest, TimesOfTheActiveVersionTheLastSegmentAndTheDeviceChange) {
                      [&](UnitOfWork* tx) { return InsertChange(tx, detected); })
           .ok());
   EXPECT_EQ(ValueOf(Scrape(), change), 1'700'000'000.5);
+}
+
+TEST_F(MetricsTest, HubCountsTheRigsThatDevicesReport) {
+  const std::string newest = "selfcal_hub_newest_report_timestamp_seconds";
+  EXPECT_EQ(ValueOf(Scrape(), "selfcal_hub_rigs"), 0);
+  EXPECT_EQ(ValueOf(Scrape(), newest), 0);
+  constexpr std::int64_t kHour = std::int64_t{3600} * 1'000'000'000;
+  constexpr std::int64_t kTime = 1'700'000'000'500'000'000;
+  const auto report =
+      [&](const std::string& rig, std::int64_t time_ns, std::int64_t waiting) {
+        ASSERT_TRUE(domain_->CreateRig(TestRig(rig)).ok());
+        const auto write = [&](UnitOfWork* tx) {
+          return WriteReportingDevice(tx,
+                                      {.key = 1,
+                                       .report = 1,
+                                       .attempt = 1,
+                                       .time_ns = time_ns,
+                                       .waiting = waiting,
+                                       .program_version = "1.2.3"});
+        };
+        ASSERT_TRUE(store_->Transact(rig, time_ns, write).ok());
+      };
+  report("gone", kTime, 4);
+  report("late", NowNs() - 25 * kHour, 2);
+  report("slow", NowNs() - 23 * kHour, 1);
+  const std::string series = Scrape();
+  EXPECT_EQ(ValueOf(series, "selfcal_hub_rigs"), 3);
+  EXPECT_EQ(ValueOf(series, "selfcal_hub_silent_rigs"), 2);
+  EXPECT_EQ(ValueOf(series, "selfcal_hub_waiting_records"), 7);
+  EXPECT_EQ(ValueOf(series, "selfcal_hub_oldest_report_timestamp_seconds"),
+            1'700'000'000.5);
+  EXPECT_GT(ValueOf(series, newest), 1'700'000'000.5);
 }
 
 TEST_F(MetricsTest, SeriesDoNotGrowWithTheRigs) {
