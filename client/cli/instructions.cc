@@ -5,17 +5,16 @@
 #include <string>
 
 #include "client/cli/commands.h"
+#include "client/cli/device_reports.h"
 #include "client/cli/instruction.h"
 #include "client/cli/list_options.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
-#include "selfcal/v1/activity_service.grpc.pb.h"
 #include "selfcal/v1/uplink.grpc.pb.h"
 
 namespace selfcal::client {
 namespace {
 
-using ActivityService = v1::ActivityService::StubInterface;
 using UplinkService = v1::UplinkService::StubInterface;
 
 // "pending", "done" or "refused".
@@ -83,18 +82,6 @@ int List(Context* context, const std::string& rig, const ListOptions& options) {
   return kDone;
 }
 
-// True if a device reports the rig.
-bool IsReported(const Context& context, const std::string& rig) {
-  const auto stub = v1::ActivityService::NewStub(context.Channel());
-  v1::ListActivityRequest request;
-  request.set_filter(fmt::format("name = \"{}\"", rig));
-  v1::ListActivityResponse activity;
-  const auto status = Call<ActivityService>(
-      stub.get(), &ActivityService::ListActivity, request, &activity);
-  return status.ok() && activity.rigs_size() == 1 &&
-         activity.rigs(0).has_device();
-}
-
 }  // namespace
 
 std::optional<v1::Instruction> InsteadOf(const grpc::Status& failed,
@@ -103,7 +90,7 @@ std::optional<v1::Instruction> InsteadOf(const grpc::Status& failed,
                                          const v1::Instruction& instruction,
                                          grpc::Status* failure) {
   if (failed.error_code() != grpc::StatusCode::FAILED_PRECONDITION ||
-      !IsReported(context, rig)) {
+      !ReadDeviceReports(context, rig)) {
     return std::nullopt;
   }
   const auto stub = v1::UplinkService::NewStub(context.Channel());

@@ -2,10 +2,12 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/device_reports.h"
 #include "client/cli/list_options.h"
 #include "client/cli/rig_text.h"
 #include "client/text/text.h"
@@ -72,7 +74,9 @@ int ShowRig(Context* context, const std::string& id) {
   const auto status =
       Call<RigService>(stub.get(), &RigService::GetRig, request, &rig);
   if (!status.ok()) return Fail(*context, status);
-  PrintRig(*context, rig);
+  std::optional<v1::ReportState> reports;
+  if (!context->json) reports = ReadDeviceReports(*context, id);
+  PrintRig(*context, rig, reports);
   return kDone;
 }
 

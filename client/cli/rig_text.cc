@@ -69,10 +69,18 @@ void AddImu(const std::string& which,
              fmt::format("{:g} m/s^2", full_scale.accel_max()));
 }
 
-Facts Describe(const v1::Rig& rig) {
+void AddReports(const v1::ReportState& reports, Facts* facts) {
+  facts->Add("last report", TimeText(reports.time()));
+  facts->Add("records waiting then", fmt::format("{}", reports.waiting()));
+  facts->Add("device program", reports.program_version());
+}
+
+Facts Describe(const v1::Rig& rig,
+               const std::optional<v1::ReportState>& reports) {
   Facts facts;
   facts.Add("rig", LastPart(rig.name()));
   facts.Add("created", TimeText(rig.create_time()));
+  if (reports) AddReports(*reports, &facts);
   for (const auto& camera : rig.factory().cameras()) {
     facts.Add("camera", CameraText(camera));
   }
@@ -129,9 +137,11 @@ Table FactoryValues(const v1::Rig& rig) {
 
 }  // namespace
 
-void PrintRig(const Context& context, const v1::Rig& rig) {
+void PrintRig(const Context& context,
+              const v1::Rig& rig,
+              const std::optional<v1::ReportState>& reports) {
   if (context.json) return context.PrintJson(rig);
-  context.Print(Describe(rig));
+  context.Print(Describe(rig, reports));
   if (context.terminal) PrintText("\n");
   context.Print(FactoryValues(rig));
 }
