@@ -17,6 +17,24 @@ export const interactionTests = {
     assert.match(r.page.url(), /a=\d+&b=\d+/);
   },
 
+  async 'a hub shows the last report of a device'(r) {
+    const device = { time: '2026-01-02T03:04:05Z', waiting: '12', programVersion: '1.2.3' };
+    const isActivity = /\/api\/v1\/activity\?/;
+    await r.page.route(isActivity, async (route) => {
+      const response = await route.fetch();
+      const activity = await response.json();
+      for (const rig of activity.rigs) rig.device = device;
+      await route.fulfill({ response, json: activity });
+    });
+    await r.open('/', 'Rigs');
+    await r.sees(', 12 wait');
+    await r.open('/rigs/tablet', 'tablet');
+    for (const text of ['Last report of the device', 'Records waiting then', '1.2.3']) {
+      await r.sees(text);
+    }
+    await r.page.unrouteAll({ behavior: 'wait' });
+  },
+
   async 'a table is sorted by its heads and searched'(r) {
     await r.open('/rigs/tablet/calibrations?a=1&b=2', 'Calibrations of tablet');
     const table = r.page.getByRole('region', { name: 'Version 2 minus version 1' });

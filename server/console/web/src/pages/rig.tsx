@@ -4,6 +4,7 @@ import { idOf, remove, rigPath } from '../api';
 import type {
   Calibration,
   Caller,
+  ListActivityResponse,
   ListSegmentsResponse,
   ListTablesResponse,
   Rig,
@@ -16,7 +17,7 @@ import { Histogram } from '../histogram';
 import { EditLabels, Labels } from '../labels';
 import { Certainty, knownOf } from '../parameters';
 import { Choice, Empty, Loaded, Meter, Problem, SegmentLink, Title } from '../parts';
-import { RigVerdict, WhatChanged, WhatToDo } from './rig_summary';
+import { DeviceReports, RigVerdict, WhatChanged, WhatToDo } from './rig_summary';
 import { NewestSession } from './session';
 import { go, useRead } from '../state';
 import { DataTable, type Column } from '../table';
@@ -202,6 +203,9 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
   const active = useRead<Calibration>(base + '/calibrations/active', props.version);
   const factory = useRead<Calibration>(base + '/calibrations/1');
   const tables = useRead<ListTablesResponse>(base + '/tables', props.version);
+  const filter = new URLSearchParams({ filter: `name = "${props.rig}"` });
+  const activities = useRead<ListActivityResponse>(`activity?${filter}`, props.version);
+  const activity = activities.value?.rigs[0];
   const known = useMemo(
     () => (active.value && factory.value ? knownOf(active.value, factory.value) : null),
     [active.value, factory.value],
@@ -230,11 +234,13 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
         {(value) => (
           <>
             <RigVerdict of={value.calibration} />
+            {activity?.device && <DeviceReports of={activity.device} />}
             <div class="side">
               <WhatChanged rig={props.rig} active={value.calibration} version={props.version} />
               <WhatToDo
                 rig={props.rig}
                 active={value.calibration}
+                activity={activity}
                 known={value.known}
                 version={props.version}
               />

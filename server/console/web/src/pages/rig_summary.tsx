@@ -8,16 +8,16 @@ import type {
   Calibration,
   CompareCalibrationsResponse,
   CompareCalibrationsResponse_Difference as Difference,
-  ListActivityResponse,
   ListCalibrationsResponse,
   ListEventsResponse,
   ListTablesResponse,
+  ReportState,
   RigActivity,
   Table,
 } from '../contract';
 import { clock, component, estimateText, number, words } from '../format';
 import { weakOf, type Known } from '../parameters';
-import { kWeak, Link, Loaded, VerdictBox, When } from '../parts';
+import { Figures, kWeak, Link, Loaded, VerdictBox, When } from '../parts';
 import { useRead } from '../state';
 import { agreement, largestOf, shownDifference } from '../comparison';
 
@@ -25,7 +25,6 @@ const kEvents = 5;
 const kLargest = 3;
 const kNotable = 1; // change of a parameter, in sigmas
 const kMostWeak = 4; // named in a sentence
-const kAll = 1000; // rigs whose name contains that of this one
 
 // ------------------------------------------------------------- verdict
 
@@ -42,6 +41,22 @@ export function RigVerdict(props: { of: Calibration }) {
         <When time={of.createTime} />.
       </p>
     </VerdictBox>
+  );
+}
+
+// ------------------------------------------------------------- reports
+
+// At a hub: from when its records of the rig are, and what the device runs.
+export function DeviceReports(props: { of: ReportState }) {
+  const { time, waiting, programVersion } = props.of;
+  return (
+    <Figures
+      of={[
+        ['Last report of the device', <When time={time} />],
+        ['Records waiting then', waiting],
+        ['Program of the device', programVersion],
+      ]}
+    />
   );
 }
 
@@ -219,12 +234,11 @@ function actionsOf(facts: Facts): ComponentChildren[] {
 export function WhatToDo(props: {
   rig: string;
   active: Calibration;
+  activity: RigActivity | undefined;
   known: Known[];
   version: number;
 }) {
   const base = rigPath(props.rig);
-  const filter = new URLSearchParams({ filter: `"${props.rig}"`, page_size: String(kAll) });
-  const activity = useRead<ListActivityResponse>(`activity?${filter}`, props.version);
   const tables = useRead<ListTablesResponse>(base + '/tables', props.version);
   const newest = useRead<ListCalibrationsResponse>(
     base + '/calibrations?page_size=1',
@@ -236,11 +250,11 @@ export function WhatToDo(props: {
         rig: props.rig,
         active: props.active,
         newest: newest.value?.calibrations[0],
-        activity: activity.value?.rigs.find((one) => idOf(one.name) === props.rig),
+        activity: props.activity,
         tables: tables.value?.tables ?? [],
         known: props.known,
       }),
-    [props.rig, props.active, props.known, newest.value, activity.value, tables.value],
+    [props.rig, props.active, props.known, newest.value, props.activity, tables.value],
   );
   return (
     <section>

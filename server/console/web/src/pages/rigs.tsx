@@ -1,6 +1,6 @@
 import type { JSX } from 'preact';
 import { idOf, pageOf } from '../api';
-import type { ListActivityResponse, RigActivity } from '../contract';
+import type { ListActivityResponse, ReportState, RigActivity } from '../contract';
 import { Labels } from '../labels';
 import { ListPage } from '../list';
 import { Link, Meter, NameLink, Problem, When } from '../parts';
@@ -15,6 +15,18 @@ function Alarms(props: { of: string[] }) {
         <li key={alarm}>{alarm}</li>
       ))}
     </ul>
+  );
+}
+
+// The last report between a device and its hub, and the records that wait.
+function Reports(props: { of: ReportState | undefined }) {
+  if (!props.of) return <span class="quiet">none</span>;
+  const { time, waiting } = props.of;
+  return (
+    <>
+      <When time={time} />
+      {waiting !== '0' && `, ${waiting} wait`}
+    </>
   );
 }
 
@@ -49,6 +61,11 @@ const kColumns: Column<RigActivity>[] = [
       />
     ),
     value: (rig) => rig.tableEntries / rig.tableCapacity,
+  },
+  {
+    head: 'Reports',
+    cell: (rig) => <Reports of={rig.uplink ?? rig.device} />,
+    value: (rig) => Date.parse((rig.uplink ?? rig.device)?.time ?? ''),
   },
   { head: 'Labels', cell: (rig) => <Labels of={rig.labels} />, wide: true },
   {
