@@ -315,7 +315,7 @@ export function Calibrations(props: { rig: string; caller: Caller | null; versio
           const one = calibrations.find((c) => c.version === shown);
           return (
             <>
-              {nextPageToken && <p class="quiet">The newest 100 versions.</p>}
+              {nextPageToken && <p class="quiet">The newest {calibrations.length} versions.</p>}
               <Versions
                 of={calibrations}
                 shown={shown}
