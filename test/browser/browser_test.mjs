@@ -13,6 +13,7 @@ import { join } from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
 import { startDaemon, workerOf } from './daemon.mjs';
+import { fleetTests } from './fleet_tests.mjs';
 import { interactionTests } from './interaction_tests.mjs';
 import { layoutTests } from './layout_tests.mjs';
 import { kPatience, Reader, until } from './reader.mjs';
@@ -426,7 +427,7 @@ try {
   const reader = new Reader(await browser.newPage(), base, screenshots);
   const other = new Reader(await browser.newPage(), base, screenshots);
   const send = (args) => start(sendSegments, args);
-  const all = { ...interactionTests, ...tests, ...layoutTests };
+  const all = { ...interactionTests, ...tests, ...fleetTests, ...layoutTests };
   for (const [name, run] of Object.entries(all)) {
     console.log(name);
     await run(reader, other, daemon, send);

@@ -94,6 +94,9 @@ async function checkPages(r, pages, name) {
 
 const kFleetPages = {
   rigs: '/',
+  'all-segments': '/segments',
+  'all-calibrations': '/calibrations',
+  'all-recalibrations': '/recalibrations',
   'all-events': '/events',
   parameters: '/parameters',
   cohorts: '/cohorts',
@@ -109,12 +112,7 @@ export const layoutTests = {
 
   async 'names of 63 and sessions of 128 characters fit, too'(r, other, daemon, send) {
     const { factory, ...rig } = await r.api('rigs/headset');
-    const created = await fetch(r.base + '/api/v1/rigs', {
-      method: 'POST',
-      headers: { 'Content-Type': 'application/json', 'X-Selfcal-Console': '1' },
-      body: JSON.stringify({ ...rig, factory, name: 'rigs/' + kLongRig }),
-    });
-    assert.equal(created.status, 200, await created.text());
+    await r.change('POST', 'rigs', { ...rig, factory, name: 'rigs/' + kLongRig });
     await send([daemon.address, kLongRig, kLongSession, '20']);
     await until('a version of the rig with a long name', async () => {
       const { recalibrations } = await r.api(`rigs/${kLongRig}/recalibrations`);

@@ -51,6 +51,17 @@ export class Reader {
   async api(path) {
     return (await fetch(this.base + '/api/v1/' + path)).json();
   }
+  // Makes a change as the pages do.
+  async change(method, path, body) {
+    const response = await fetch(this.base + '/api/v1/' + path, {
+      method,
+      headers: { 'Content-Type': 'application/json', 'X-Selfcal-Console': '1' },
+      body: JSON.stringify(body),
+    });
+    const text = await response.text();
+    assert.equal(response.status, 200, text);
+    return JSON.parse(text);
+  }
   async heading(text) {
     await this.page
       .getByRole('heading', { level: 1, name: text, exact: true })

@@ -83,6 +83,11 @@ export function idOf(name: string): string {
   return name.slice(name.lastIndexOf('/') + 1);
 }
 
+// rigs/{rig}, of the name of a resource of the rig.
+export function rigOf(name: string): string {
+  return name.split('/', 2).join('/');
+}
+
 // The path of a rig.
 export function rigPath(rig: string): string {
   return 'rigs/' + encodeURIComponent(rig);

@@ -4,6 +4,7 @@ import './style.css';
 import { render } from 'preact';
 import { useEffect } from 'preact/hooks';
 import type { Caller } from './contract';
+import { kRigFilter } from './fleet';
 import { ShortcutHelp } from './shortcuts';
 import { Empty, Link, Problem, Title } from './parts';
 import { useAddress, useLive, useRead } from './state';
@@ -12,13 +13,14 @@ import { CoachPage } from './pages/coach';
 import { Cohorts } from './pages/cohorts';
 import { Events } from './pages/events';
 import { FleetParameters } from './pages/fleet_parameters';
+import { FleetVersions } from './pages/fleet_versions';
 import { Instructions } from './pages/instructions';
 import { RigPage } from './pages/rig';
 import { Rigs } from './pages/rigs';
 import { RunPage } from './pages/run';
-import { Runs } from './pages/runs';
+import { FleetRuns, Runs } from './pages/runs';
 import { SegmentPage } from './pages/segment';
-import { Segments } from './pages/segments';
+import { FleetSegments, Segments } from './pages/segments';
 import { SessionPage, Sessions } from './pages/session';
 
 const kRigPages: [string, string][] = [
@@ -48,10 +50,54 @@ function RigNav(props: { rig: string; page: string }) {
   );
 }
 
+// The pages about all rigs that the overview leads to.
+const kFleetPages: [string, string][] = [
+  ['', 'Overview'],
+  ['segments', 'Segments'],
+  ['calibrations', 'Calibrations'],
+  ['recalibrations', 'Runs'],
+];
+
+// The rigs that are chosen on one of these pages stay so on the others.
+function FleetNav(props: { page: string }) {
+  const address = useAddress().searchParams;
+  const parameterOf = (page: string) => (page ? kRigFilter : 'filter');
+  const filter = address.get(parameterOf(props.page));
+  const query = (page: string) =>
+    filter ? '?' + new URLSearchParams({ [parameterOf(page)]: filter }).toString() : '';
+  return (
+    <nav class="tabs" aria-label="Pages of all rigs">
+      {kFleetPages.map(([page, name]) => (
+        <Link key={page} to={'/' + page + query(page)} current={page === props.page}>
+          {name}
+        </Link>
+      ))}
+    </nav>
+  );
+}
+
+function FleetPage(props: { page: string; version: number }) {
+  const { page, version } = props;
+  if (page === 'segments') return <FleetSegments version={version} />;
+  if (page === 'calibrations') return <FleetVersions version={version} />;
+  if (page === 'recalibrations') return <FleetRuns version={version} />;
+  return <Rigs version={version} />;
+}
+
+const isFleetPage = (parts: string[]) =>
+  parts.length < 2 && kFleetPages.some(([page]) => page === (parts[0] ?? ''));
+
 function Page(props: { parts: string[]; caller: Caller | null; version: number }) {
   const [top, rig, page, id] = props.parts;
   const { version, caller } = props;
-  if (!top) return <Rigs version={version} />;
+  if (isFleetPage(props.parts)) {
+    return (
+      <>
+        <FleetNav page={top ?? ''} />
+        <FleetPage page={top ?? ''} version={version} />
+      </>
+    );
+  }
   if (top === 'events' && !rig) return <Events rig="" version={version} />;
   if (top === 'parameters' && !rig) return <FleetParameters version={version} />;
   if (top === 'cohorts' && !rig) return <Cohorts version={version} />;
@@ -129,7 +175,7 @@ function App() {
           selfcal
         </Link>
         <nav aria-label="Main">
-          <Link to="/" current={parts.length === 0 || rig !== ''}>
+          <Link to="/" current={isFleetPage(parts) || rig !== ''}>
             Rigs
           </Link>
           <Link to="/parameters" current={parts[0] === 'parameters'}>

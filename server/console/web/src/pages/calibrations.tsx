@@ -228,43 +228,49 @@ function Version(props: { of: Calibration }) {
   );
 }
 
+// Names the version; that which is shown is marked.
+export function versionColumn(shown: string | undefined): Column<Calibration> {
+  return {
+    head: 'Version',
+    cell: (c) => (
+      <Link to={pageOf(c.name)} current={c.version === shown}>
+        {c.version === '1' ? '1 (factory)' : c.version}
+      </Link>
+    ),
+    value: (c) => Number(c.version),
+  };
+}
+
+export const kVersionDetails: Column<Calibration>[] = [
+  { head: 'State', cell: (c) => <Badge state={c.state} />, value: (c) => words(c.state) },
+  {
+    head: 'Verdict',
+    cell: (c) => (c.verdict ? <Badge state={c.verdict.kind} /> : ''),
+    value: (c) => c.verdict?.text ?? '',
+  },
+  {
+    head: 'Created',
+    cell: (c) => <When time={c.createTime} />,
+    value: (c) => Date.parse(c.createTime ?? ''),
+  },
+  {
+    head: 'Segments',
+    cell: (c) => c.provenance?.segments.length ?? '',
+    value: (c) => c.provenance?.segments.length,
+  },
+  {
+    head: 'Reprojection error [px]',
+    cell: (c) => (c.solver ? number(c.solver.reprojectionRmsAfterPx) : ''),
+    value: (c) => c.solver?.reprojectionRmsAfterPx,
+  },
+];
+
 function versionColumns(
   shown: string | undefined,
   active: string,
   onActivate: ((asked: Calibration) => void) | null,
 ): Column<Calibration>[] {
-  const columns: Column<Calibration>[] = [
-    {
-      head: 'Version',
-      cell: (c) => (
-        <Link to={pageOf(c.name)} current={c.version === shown}>
-          {c.version === '1' ? '1 (factory)' : c.version}
-        </Link>
-      ),
-      value: (c) => Number(c.version),
-    },
-    { head: 'State', cell: (c) => <Badge state={c.state} />, value: (c) => words(c.state) },
-    {
-      head: 'Verdict',
-      cell: (c) => (c.verdict ? <Badge state={c.verdict.kind} /> : ''),
-      value: (c) => c.verdict?.text ?? '',
-    },
-    {
-      head: 'Created',
-      cell: (c) => <When time={c.createTime} />,
-      value: (c) => Date.parse(c.createTime ?? ''),
-    },
-    {
-      head: 'Segments',
-      cell: (c) => c.provenance?.segments.length ?? '',
-      value: (c) => c.provenance?.segments.length,
-    },
-    {
-      head: 'Reprojection error [px]',
-      cell: (c) => (c.solver ? number(c.solver.reprojectionRmsAfterPx) : ''),
-      value: (c) => c.solver?.reprojectionRmsAfterPx,
-    },
-  ];
+  const columns = [versionColumn(shown), ...kVersionDetails];
   if (!onActivate) return columns;
   const button = (c: Calibration) => (
     <button type="button" onClick={() => onActivate(c)}>

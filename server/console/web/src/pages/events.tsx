@@ -1,8 +1,8 @@
-import { idOf, rigPath } from '../api';
+import { rigPath } from '../api';
 import type { Event, ListEventsResponse } from '../contract';
+import { rigColumn } from '../fleet';
 import { clock, words } from '../format';
 import { ListPage } from '../list';
-import { NameLink } from '../parts';
 import type { Column } from '../table';
 
 const kColumns: Column<Event>[] = [
@@ -12,12 +12,7 @@ const kColumns: Column<Event>[] = [
     cell: (event) => <time dateTime={event.time}>{clock(event.time)}</time>,
     value: (event) => Date.parse(event.time ?? ''),
   },
-  {
-    head: 'Rig',
-    cell: (event) =>
-      event.rig ? <NameLink name={event.rig}>{idOf(event.rig)}</NameLink> : 'the daemon',
-    value: (event) => (event.rig ? idOf(event.rig) : ''),
-  },
+  rigColumn((event) => event.rig),
   { head: 'Event', cell: (event) => words(event.kind), value: (event) => words(event.kind) },
   { head: 'Detail', cell: (event) => event.detail, value: (event) => event.detail, wide: true },
 ];

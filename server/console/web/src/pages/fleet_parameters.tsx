@@ -1,12 +1,13 @@
 // One parameter of the active versions of many rigs.
 import type { JSX } from 'preact';
 import { useMemo } from 'preact/hooks';
-import { idOf, pageOf } from '../api';
+import { pageOf } from '../api';
 import type { Estimate, ListEstimatesResponse } from '../contract';
+import { RigFilter, rigColumn } from '../fleet';
 import { component, heading, shownUnit, sigmaText, valueText } from '../format';
 import { Histogram } from '../histogram';
 import { ListPage } from '../list';
-import { Link, NameLink, Problem } from '../parts';
+import { Link, Problem } from '../parts';
 import { go, useAddress, useRead, withQuery } from '../state';
 import type { Column } from '../table';
 
@@ -23,11 +24,7 @@ function differenceText(estimate: Estimate): string {
 }
 
 const kColumns: Column<Estimate>[] = [
-  {
-    head: 'Rig',
-    cell: (estimate) => <NameLink name={estimate.rig}>{idOf(estimate.rig)}</NameLink>,
-    value: (estimate) => idOf(estimate.rig),
-  },
+  rigColumn((estimate) => estimate.rig),
   {
     head: 'Version',
     cell: (estimate) => (
@@ -84,8 +81,8 @@ export function FleetParameters(props: { version: number }) {
   const query = useAddress().searchParams;
   const name = query.get('component') || kDefault;
   const filter = query.get('filter') ?? '';
-  const put = (key: string, event: JSX.TargetedEvent<HTMLInputElement>) =>
-    go(withQuery({ [key]: event.currentTarget.value, page_token: '' }), true);
+  const choose = (event: JSX.TargetedEvent<HTMLInputElement>) =>
+    go(withQuery({ component: event.currentTarget.value, page_token: '' }), true);
   return (
     <ListPage
       title="Parameters"
@@ -102,23 +99,9 @@ export function FleetParameters(props: { version: number }) {
           <form class="bar" role="search" onSubmit={(event) => event.preventDefault()}>
             <label>
               Parameter
-              <input
-                type="search"
-                value={name}
-                size={24}
-                onChange={(event) => put('component', event)}
-              />
+              <input type="search" value={name} size={24} onChange={choose} />
             </label>
-            <label>
-              Rigs
-              <input
-                type="search"
-                value={filter}
-                placeholder='a part of the name, or labels.model = "t4"'
-                size={40}
-                onInput={(event) => put('filter', event)}
-              />
-            </label>
+            <RigFilter label="Rigs" parameter="filter" />
           </form>
           {mistake ? (
             <Problem error={mistake} />

@@ -1,7 +1,8 @@
-import { idOf, pageOf, rigPath } from '../api';
+import { idOf, pageOf, rigOf, rigPath } from '../api';
 import type { ListRecalibrationsResponse, Recalibration, SolverReport } from '../contract';
+import { RigChoice, kRigFilter, rigColumn } from '../fleet';
 import { number, words } from '../format';
-import { ListPage } from '../list';
+import { ListPage, kPageSizeAcrossRigs } from '../list';
 import { Badge, Link, When } from '../parts';
 import type { Column } from '../table';
 
@@ -14,12 +15,13 @@ export function Result(props: { of: Recalibration }) {
   return <Link to={pageOf(calibration)}>version {idOf(calibration)}</Link>;
 }
 
-const kColumns: Column<Recalibration>[] = [
-  {
-    head: 'Run',
-    cell: (run) => <Link to={pageOf(run.name)}>{idOf(run.name)}</Link>,
-    value: (run) => Number(idOf(run.name)),
-  },
+const kRun: Column<Recalibration> = {
+  head: 'Run',
+  cell: (run) => <Link to={pageOf(run.name)}>{idOf(run.name)}</Link>,
+  value: (run) => Number(idOf(run.name)),
+};
+
+const kDetails: Column<Recalibration>[] = [
   { head: 'State', cell: (run) => <Badge state={run.state} />, value: (run) => words(run.state) },
   { head: 'Trigger', cell: (run) => words(run.trigger), value: (run) => words(run.trigger) },
   {
@@ -45,12 +47,35 @@ const kColumns: Column<Recalibration>[] = [
   { head: 'Message', cell: (run) => run.message, value: (run) => run.message, wide: true },
 ];
 
+const kColumns = [kRun, ...kDetails];
+const kColumnsAcrossRigs = [kRun, rigColumn((run: Recalibration) => rigOf(run.name)), ...kDetails];
+
+const itemsOf = (response: ListRecalibrationsResponse) => response.recalibrations;
+
+// The runs of all rigs, or of those of a filter.
+export function FleetRuns(props: { version: number }) {
+  return (
+    <ListPage
+      title="Runs"
+      path="recalibrations"
+      items={itemsOf}
+      query={[kRigFilter]}
+      pageSize={kPageSizeAcrossRigs}
+      version={props.version}
+      columns={kColumnsAcrossRigs}
+      next="Older runs"
+      empty="None of these rigs has a run."
+      above={(mistake) => <RigChoice mistake={mistake} />}
+    />
+  );
+}
+
 export function Runs(props: { rig: string; version: number }) {
   return (
     <ListPage
       title={'Runs of ' + props.rig}
       path={rigPath(props.rig) + '/recalibrations'}
-      items={(response: ListRecalibrationsResponse) => response.recalibrations}
+      items={itemsOf}
       version={props.version}
       columns={kColumns}
       next="Older runs"

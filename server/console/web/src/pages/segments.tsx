@@ -1,10 +1,11 @@
-// The segments of a rig, filtered and sorted.
+// The segments of a rig or of many rigs, filtered and sorted.
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useState } from 'preact/hooks';
-import { idOf, rigPath, type ApiError } from '../api';
-import type { GroupScore, ListSegmentsResponse, Rig, Segment } from '../contract';
+import { idOf, rigOf, rigPath, type ApiError } from '../api';
+import type { GroupScore, ListRigsResponse, ListSegmentsResponse, Rig, Segment } from '../contract';
+import { RigChoice, kRigFilter, rigColumn } from '../fleet';
 import { bytes, number, words } from '../format';
-import { ListPage, orderOf } from '../list';
+import { ListPage, kPageSizeAcrossRigs, orderOf } from '../list';
 import { Badge, Choice, Link, SegmentLink, When } from '../parts';
 import { go, useAddress, useRead, withQuery } from '../state';
 import type { Column } from '../table';
@@ -15,7 +16,7 @@ function kept(segment: Segment): string {
 }
 
 // The columns, with the score for one group.
-function columns(group: string): Column<Segment>[] {
+function columns(group: string, acrossRigs: boolean): Column<Segment>[] {
   const of = (segment: Segment, show: (score: GroupScore) => string) => {
     const score = segment.scores.find((s) => s.group === group);
     return score ? show(score) : '';
@@ -26,6 +27,7 @@ function columns(group: string): Column<Segment>[] {
       cell: (segment) => <SegmentLink name={segment.name} />,
       value: (segment) => decodeURIComponent(idOf(segment.name)),
     },
+    ...(acrossRigs ? [rigColumn((segment: Segment) => rigOf(segment.name))] : []),
     {
       head: 'Received',
       cell: (segment) => <When time={segment.receiveTime} />,
@@ -184,6 +186,7 @@ function Nothing(props: { rig: string; filter: string; order: string }) {
       </p>
     );
   }
+  if (!props.rig) return <p>None of these rigs has a segment.</p>;
   return (
     <p>
       No segment has arrived yet. Send some with the client library, or{' '}
@@ -192,33 +195,57 @@ function Nothing(props: { rig: string; filter: string; order: string }) {
   );
 }
 
-export function Segments(props: { rig: string; version: number }) {
+// The groups of the rigs, each once.
+function groupsOf(rigs: Rig[]): string[] {
+  return [...new Set(rigs.flatMap((rig) => rig.groups.map((g) => g.group)))];
+}
+
+// The segments of one rig, or of those of a filter if `rig` is ''.
+function SegmentList(props: { rig: string; groups: string[]; version: number }) {
   const address = useAddress().searchParams;
-  const rig = useRead<Rig>(rigPath(props.rig));
-  const groups = rig.value?.groups.map((g) => g.group) ?? [];
+  const { rig, groups } = props;
   const group = address.get('group') ?? groups[0] ?? '';
   const [order] = orderOf(address, kNewestFirst);
-  const shown = useMemo(() => columns(group), [group]);
+  const shown = useMemo(() => columns(group, !rig), [group, rig]);
   return (
     <ListPage
-      title={'Segments of ' + props.rig}
-      path={rigPath(props.rig) + '/segments'}
+      title={rig ? 'Segments of ' + rig : 'Segments'}
+      path={rig ? rigPath(rig) + '/segments' : 'segments'}
       items={(response: ListSegmentsResponse) => response.segments}
-      query={['filter']}
+      query={rig ? ['filter'] : ['filter', kRigFilter]}
       fixed={{ view: 'BASIC' }}
       order={kNewestFirst}
+      pageSize={rig ? undefined : kPageSizeAcrossRigs}
       version={props.version}
       columns={shown}
       next="Next segments"
-      empty={<Nothing rig={props.rig} filter={address.get('filter') ?? ''} order={order} />}
-      above={(mistake) => (
-        <>
-          <Filter mistake={mistake} group={group} groups={groups} />
-          {kNotOfAll.test(order) && !mistake && (
-            <p class="quiet">Segments without a value in the sorted column are not listed.</p>
-          )}
-        </>
-      )}
+      empty={<Nothing rig={rig} filter={address.get('filter') ?? ''} order={order} />}
+      above={(mistake) => {
+        const isOfRigs = mistake?.message.startsWith(kRigFilter) ?? false;
+        return (
+          <>
+            {!rig && <RigChoice mistake={isOfRigs ? mistake : null} />}
+            <Filter mistake={isOfRigs ? null : mistake} group={group} groups={groups} />
+            {kNotOfAll.test(order) && !mistake && (
+              <p class="quiet">Segments without a value in the sorted column are not listed.</p>
+            )}
+          </>
+        );
+      }}
     />
   );
+}
+
+export function Segments(props: { rig: string; version: number }) {
+  const rig = useRead<Rig>(rigPath(props.rig));
+  return <SegmentList {...props} groups={groupsOf(rig.value ? [rig.value] : [])} />;
+}
+
+// Offers the groups of the first rigs of the filter: devices that are looked at
+// together have the same.
+export function FleetSegments(props: { version: number }) {
+  const filter = useAddress().searchParams.get(kRigFilter) ?? '';
+  const query = new URLSearchParams({ filter, page_size: kPageSizeAcrossRigs });
+  const rigs = useRead<ListRigsResponse>('rigs?' + query.toString());
+  return <SegmentList {...props} rig="" groups={groupsOf(rigs.value?.rigs ?? [])} />;
 }
