@@ -76,12 +76,12 @@ function FleetNav(props: { page: string }) {
   );
 }
 
-function FleetPage(props: { page: string; version: number }) {
+function FleetPage(props: { page: string; caller: Caller | null; version: number }) {
   const { page, version } = props;
   if (page === 'segments') return <FleetSegments version={version} />;
   if (page === 'calibrations') return <FleetVersions version={version} />;
   if (page === 'recalibrations') return <FleetRuns version={version} />;
-  return <Rigs version={version} />;
+  return <Rigs caller={props.caller} version={version} />;
 }
 
 const isFleetPage = (parts: string[]) =>
@@ -94,7 +94,7 @@ function Page(props: { parts: string[]; caller: Caller | null; version: number }
     return (
       <>
         <FleetNav page={top ?? ''} />
-        <FleetPage page={top ?? ''} version={version} />
+        <FleetPage page={top ?? ''} caller={caller} version={version} />
       </>
     );
   }

@@ -229,6 +229,8 @@ export function DataTable<T extends object>(props: {
             placeholder={whole ? 'Find in this table' : 'Find in these rows'}
             aria-label={`Find in the table: ${caption}`}
             onInput={(event) => setFilter(event.currentTarget.value)}
+            // Does not submit a form that has the table.
+            onKeyDown={(event) => event.key === 'Enter' && event.preventDefault()}
           />
           <span class="quiet" role="status">
             {filter && `${rows.length} of ${items.length}`}

@@ -1,6 +1,10 @@
-import type { JSX } from 'preact';
+import { useState } from 'preact/hooks';
+import { mayAdminister } from '../action';
 import { idOf, pageOf } from '../api';
-import type { ListActivityResponse, ReportState, RigActivity } from '../contract';
+import { kRecalibrate, kRollBack, type BulkAction } from '../bulk';
+import { BulkDialog } from '../bulk_dialog';
+import type { Caller, ListActivityResponse, ReportState, RigActivity } from '../contract';
+import { RigFilter } from '../fleet';
 import { Labels } from '../labels';
 import { ListPage } from '../list';
 import { Link, Meter, NameLink, Problem, When } from '../parts';
@@ -88,12 +92,32 @@ function Nothing(props: { filter: string; withAlarms: boolean }) {
   );
 }
 
-export function Rigs(props: { version: number }) {
+interface Asked {
+  action: BulkAction;
+  query: Record<string, string>;
+}
+
+// What an administrator may change of all rigs that are listed, on every page.
+function Administration(props: { filter: string; withAlarms: boolean }) {
+  const [asked, setAsked] = useState<Asked | null>(null);
+  const query = { filter: props.filter, with_alarms: String(props.withAlarms) };
+  return (
+    <p class="buttons">
+      {[kRecalibrate, kRollBack].map((action) => (
+        <button key={action.imperative} type="button" onClick={() => setAsked({ action, query })}>
+          {action.imperative} these rigs
+        </button>
+      ))}
+      {asked && <BulkDialog {...asked} onEnd={() => setAsked(null)} />}
+    </p>
+  );
+}
+
+export function Rigs(props: { caller: Caller | null; version: number }) {
   const query = useAddress().searchParams;
   const filter = query.get('filter') ?? '';
   const withAlarms = query.get('with_alarms') === 'true';
-  const search = (event: JSX.TargetedInputEvent<HTMLInputElement>) =>
-    go(withQuery({ filter: event.currentTarget.value, page_token: '' }), true);
+  const isChosen = filter.trim() !== '' || withAlarms;
   return (
     <ListPage
       title="Rigs"
@@ -106,36 +130,32 @@ export function Rigs(props: { version: number }) {
       next="Next rigs"
       empty={<Nothing filter={filter} withAlarms={withAlarms} />}
       above={(mistake) => (
-        <form class="bar" role="search" onSubmit={(event) => event.preventDefault()}>
-          <label>
-            Filter
-            <input
-              type="search"
-              value={filter}
-              placeholder="a part of the name, or labels.site = lab"
-              size={40}
-              onInput={search}
-            />
-          </label>
-          <label>
-            <input
-              type="checkbox"
-              checked={withAlarms}
-              onChange={(event) =>
-                go(
-                  withQuery({
-                    with_alarms: event.currentTarget.checked ? 'true' : '',
-                    order_by: event.currentTarget.checked ? 'alarms desc' : '',
-                    page_token: '',
-                  }),
-                  true,
-                )
-              }
-            />
-            only with alarms, the most urgent first
-          </label>
-          {mistake && <Problem error={mistake} />}
-        </form>
+        <>
+          <form class="bar" role="search" onSubmit={(event) => event.preventDefault()}>
+            <RigFilter label="Filter" parameter="filter" />
+            <label>
+              <input
+                type="checkbox"
+                checked={withAlarms}
+                onChange={(event) =>
+                  go(
+                    withQuery({
+                      with_alarms: event.currentTarget.checked ? 'true' : '',
+                      order_by: event.currentTarget.checked ? 'alarms desc' : '',
+                      page_token: '',
+                    }),
+                    true,
+                  )
+                }
+              />
+              only with alarms, the most urgent first
+            </label>
+            {mistake && <Problem error={mistake} />}
+          </form>
+          {isChosen && !mistake && mayAdminister(props.caller) && (
+            <Administration filter={filter} withAlarms={withAlarms} />
+          )}
+        </>
       )}
     />
   );

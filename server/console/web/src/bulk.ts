@@ -1,0 +1,197 @@
+// Changes of all rigs of a filter: which rigs each of them changes, and making
+// them. A rig that fails does not hold up the others.
+import { get, idOf, post } from './api';
+import type {
+  ActivateCalibrationRequest,
+  Calibration,
+  ListActivityResponse,
+  ListCalibrationsResponse,
+  RigActivity,
+  StartRecalibrationRequest,
+} from './contract';
+
+// What the administrator states when the changes are confirmed.
+export interface Statement {
+  reason: string;
+  force: boolean;
+}
+
+// A call of the API, and the same as an instruction for a device.
+interface Call {
+  path: string;
+  body: object;
+  instruction: {
+    activateCalibration?: ActivateCalibrationRequest;
+    startRecalibration?: StartRecalibrationRequest;
+  };
+}
+
+export interface RigChange {
+  rig: string; // rigs/{rig}
+  effect: string; // e.g. from version 3 to 2
+  isReported: boolean; // by its device, which a hub instructs instead
+  call: (statement: Statement) => Call;
+}
+
+// Why a rig is not changed.
+export interface Remark {
+  rig: string; // rigs/{rig}
+  text: string;
+}
+
+export interface Plan {
+  changes: RigChange[];
+  leftOut: Remark[];
+}
+
+export interface BulkAction {
+  imperative: string; // Roll back
+  progressive: string; // Rolling back
+  result: string; // The version before is active
+  explanation: string;
+  takes: 'reason' | 'force'; // the part of the statement that it uses
+  // The change of a rig, or why it is left out.
+  plan: (rig: RigActivity, signal: AbortSignal) => Promise<RigChange | string>;
+}
+
+// Calls at a time: the daemon has few connections, which other pages need, too.
+const kAtOnce = 4;
+const kPageSize = '500';
+
+async function readAll<R extends { nextPageToken: string }, T>(
+  path: string,
+  query: Record<string, string>,
+  itemsOf: (response: R) => T[],
+  signal: AbortSignal,
+): Promise<T[]> {
+  const items: T[] = [];
+  let token = '';
+  do {
+    const page = new URLSearchParams({ ...query, page_size: kPageSize, page_token: token });
+    const response = await get<R>(`${path}?${page}`);
+    items.push(...itemsOf(response));
+    token = response.nextPageToken;
+  } while (token && !signal.aborted);
+  return items;
+}
+
+// Calls `act` for each item, some at a time, until the signal is aborted.
+async function forEach<T>(
+  items: T[],
+  signal: AbortSignal,
+  act: (item: T) => Promise<void>,
+): Promise<void> {
+  const waiting = items.values();
+  const work = async () => {
+    for (const item of waiting) {
+      if (signal.aborted) return;
+      await act(item);
+    }
+  };
+  await Promise.all(Array.from({ length: kAtOnce }, work));
+}
+
+const textOf = (failure: Error) => failure.message;
+
+const byRig = (a: { rig: string }, b: { rig: string }) => (a.rig < b.rig ? -1 : 1);
+
+// Reads the rigs of a query of ListActivity, and what the action changes of
+// each. Throws a Failure if the rigs cannot be read.
+export async function readPlan(
+  action: BulkAction,
+  query: Record<string, string>,
+  signal: AbortSignal,
+): Promise<Plan> {
+  const rigs = await readAll(
+    'activity',
+    { ...query, order_by: 'name asc' },
+    (response: ListActivityResponse) => response.rigs,
+    signal,
+  );
+  const plan: Plan = { changes: [], leftOut: [] };
+  await forEach(rigs, signal, async (rig) => {
+    const planned = await action.plan(rig, signal).catch(textOf);
+    if (typeof planned === 'string') plan.leftOut.push({ rig: rig.name, text: planned });
+    else plan.changes.push(planned);
+  });
+  return { changes: plan.changes.sort(byRig), leftOut: plan.leftOut.sort(byRig) };
+}
+
+// Makes the changes, and reports each with the failure, or null, when it is made.
+export async function makeChanges(
+  changes: RigChange[],
+  statement: Statement,
+  signal: AbortSignal,
+  onMade: (change: RigChange, failure: string | null) => void,
+): Promise<void> {
+  await forEach(changes, signal, async (change) => {
+    const { path, body, instruction } = change.call(statement);
+    const made = change.isReported
+      ? post(change.rig + '/instructions', instruction)
+      : post(path, body);
+    onMade(change, await made.then(() => null, textOf));
+  });
+}
+
+export const kRecalibrate: BulkAction = {
+  imperative: 'Recalibrate',
+  progressive: 'Recalibrating',
+  result: 'A run was started',
+  explanation: 'Each rig gets a run on the segments that its tables hold now.',
+  takes: 'force',
+  plan: (rig) =>
+    Promise.resolve({
+      rig: rig.name,
+      effect: 'start a run',
+      isReported: rig.device !== undefined,
+      call: ({ force }) => ({
+        path: rig.name + '/recalibrations',
+        body: { force },
+        instruction: { startRecalibration: { parent: rig.name, force } },
+      }),
+    }),
+};
+
+// The change that makes the version before the active one active again, or why
+// there is none. The versions are ordered from the newest.
+function rollbackOf(rig: RigActivity, versions: Calibration[]): RigChange | string {
+  const at = versions.findIndex((version) => version.state === 'ACTIVE');
+  if (at < 0) return 'It has no active version.';
+  const active = versions[at].version;
+  const undone = versions.slice(0, at).find((version) => version.state === 'ROLLED_BACK');
+  if (undone) {
+    return `It is rolled back already, from version ${undone.version} to ${active}.`;
+  }
+  const before = versions.slice(at + 1).find((version) => version.state === 'SUPERSEDED');
+  if (!before) return `No version was active before version ${active}.`;
+  const { name } = before;
+  return {
+    rig: rig.name,
+    effect: `from version ${active} to ${idOf(name)}`,
+    isReported: rig.device !== undefined,
+    call: ({ reason }) => ({
+      path: name + ':activate',
+      body: { reason },
+      instruction: { activateCalibration: { name, reason } },
+    }),
+  };
+}
+
+export const kRollBack: BulkAction = {
+  imperative: 'Roll back',
+  progressive: 'Rolling back',
+  result: 'The version before is active',
+  explanation:
+    'Every device that watches these rigs receives the version at once. The event logs record the reason.',
+  takes: 'reason',
+  plan: async (rig, signal) =>
+    rollbackOf(
+      rig,
+      await readAll(
+        rig.name + '/calibrations',
+        { view: 'BASIC' },
+        (response: ListCalibrationsResponse) => response.calibrations,
+        signal,
+      ),
+    ),
+};
