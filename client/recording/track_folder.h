@@ -3,6 +3,7 @@
 //
 //   tracks.csv   time [ns], camera, landmark, x, y [px]; in any order
 //   imu.csv      as of csv_list.h
+//   imu1.csv     the same of a second IMU, if there is one
 //
 // Cameras are numbered from 0. A landmark is a number that means the same point
 // of the scene in all images and cameras. Pixels are those of the original,

@@ -28,8 +28,8 @@ enum class Accepted {
   kCoefficients,  // what the camera's model accepts
 };
 
-// When data began to have a block: data from before gets its default. Of
-// kNames are all later blocks: since then, records name their components.
+// When data began to have a block: data from before gets its default. All later
+// blocks are kNames: since then, records name their components.
 enum class StoredSince { kBegin, kTimeOffset, kNames };
 
 // Standard deviations by grade of IMU (imu_grades.h).

@@ -21,7 +21,9 @@ absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit);
 
 // False for a segment that is not offered to the tables, because it does not
 // fit or because too many of its observations are outliers; the reason is
-// recorded.
+// recorded. A further reason is a value of ExclusionCause
+// (server/store/session.h) and of selfcal.v1.TableExclusion.Cause, with its
+// words in server/encode/encode_segment.cc.
 absl::StatusOr<bool> AdmitByFit(UnitOfWork* tx,
                                 std::int64_t segment,
                                 const ResidualStatistics& residuals,

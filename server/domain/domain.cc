@@ -444,7 +444,8 @@ absl::StatusOr<StoredRun> Domain::EndRun(const RigClaim& claim,
 
 absl::StatusOr<ReportAnswer> Domain::TakeReport(const DeviceReport& report) {
   const Moment now = clock_();
-  // Before it is looked for, so that no first report slips in between.
+  // Ended before the rig is looked for, so that no first report slips in
+  // between.
   if (report.deleted) {
     SELFCAL_RETURN_IF_ERROR(store_->EndReports(
         report.key, report.attempt, now.time_ns, kEndOfReportsKept_ns));
@@ -455,8 +456,8 @@ absl::StatusOr<ReportAnswer> Domain::TakeReport(const DeviceReport& report) {
   const bool is_first = report.number == 1;
   ReportAnswer begin_anew;
   begin_anew.begin_anew = true;
-  // Its records do not fit, unless it is of another device, in which case only
-  // the first report returns the error.
+  // The records do not fit those here. If the rig is of another device, that is
+  // said in answer to its first report.
   if (absl::IsFailedPrecondition(taken.status()) && !is_first) {
     return begin_anew;
   }

@@ -1,8 +1,9 @@
 // The rules of selfcald: what happens to rigs, segments, runs and calibrations,
 // and when. Each method writes in one transaction of the store (store.h), by
 // the functions of this module, or reads one state of it; CommitScore reads
-// before it writes, StartTimedRuns and StartSessionRuns write in one for each
-// rig. Errors are those of the store.
+// before it writes, what concerns many rigs (StartTimedRuns, StartSessionRuns,
+// NoteOutliers) writes in one for each, and TakeReport tries an existing rig
+// before it inserts one. Errors are those of the store.
 //
 // Any thread may call. All methods that write return after the commit, but for
 // BeginPutSegment. Of a rig that a device reports only a report, and DeleteRig,

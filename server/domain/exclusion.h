@@ -1,4 +1,5 @@
-// Removal of segments from tables; the reason is recorded as an exclusion.
+// Removal of segments from tables, and refusal of those that are not offered;
+// the reason is recorded as an exclusion.
 #pragma once
 
 #include <absl/status/status.h>

@@ -24,8 +24,8 @@ inline constexpr std::int64_t kEndOfReportsKept_ns =
 // A report as it arrived.
 struct DeviceReport {
   std::string rig = {};
-  std::int64_t key = 0;  // of the rig in the database of the device
-  std::int64_t number = 0;
+  std::int64_t key = 0;      // of the rig in the database of the device
+  std::int64_t number = 0;   // of the report, from 1; 1 begins anew
   std::int64_t attempt = 0;  // Report::attempt; 0: the device counts none
   bool deleted = false;      // the device has deleted the rig
   std::string records = {};  // Report::records
@@ -53,8 +53,11 @@ struct ReportAnswer {
 // OK unless a device reports the rig: then FAILED_PRECONDITION, which says so.
 absl::Status CheckOwnRig(UnitOfWork* tx);
 
-// Takes a report about a rig that exists. FAILED_PRECONDITION for one of
-// another device, or about a rig of the hub's own.
+// Takes a report about a rig that exists. One with the number of the last is a
+// repetition and is applied again; one that does not follow the last is not
+// taken (ReportAnswer::begin_anew), nor is one of an older attempt
+// (ReportAnswer::attempt). FAILED_PRECONDITION for one of another device, or
+// about a rig of the hub's own.
 absl::StatusOr<ReportAnswer> TakeReport(UnitOfWork* tx,
                                         const DeviceReport& report,
                                         const Quotas& quotas);

@@ -46,15 +46,15 @@ absl::StatusOr<std::string> DeferReason(const RunContext& context,
   return conditions == nullptr ? "" : conditions->DeferReason();
 }
 
-Execution Hold(const RunContext& context,
-               const StoredRun& run,
-               const std::string& reason) {
+Execution Defer(const RunContext& context,
+                const StoredRun& run,
+                const std::string& reason) {
   if (run.message == reason) {
     return Execution::kDeferred;
   }
-  const absl::Status held =
+  const absl::Status deferred =
       context.domain->DeferRun(context.claim, run.run, reason);
-  if (!held.ok()) return AfterFailure(held);
+  if (!deferred.ok()) return AfterFailure(deferred);
   spdlog::info("run {} of rig {} is deferred: {}", run.run, run.rig, reason);
   StoredRun now = run;
   now.message = reason;
@@ -185,7 +185,7 @@ Execution ExecuteRun(const RunContext& context,
     return Execution::kTryLater;
   }
   if (pending.state == RunState::kPending && !hold->empty()) {
-    return Hold(context, pending, *hold);
+    return Defer(context, pending, *hold);
   }
   const auto begun = context.current->Begin(
       [&] { return context.domain->BeginRun(context.claim, pending.run); });

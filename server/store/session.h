@@ -59,7 +59,7 @@ enum class ExclusionCause {
   kDataEvicted,  // by a quota
   kUnusable,
   kDoesNotFit,    // larger residuals than the rig's other segments
-  kManyOutliers,  // too many of its observations were excluded
+  kManyOutliers,  // too many of its observations are outliers
 };
 
 // An exclusion: why the table of a group does not hold a scored segment.

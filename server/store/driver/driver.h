@@ -14,7 +14,8 @@
 //   OpenStore (open_store.cc) opens it, and the libraries in
 //   server/CMakeLists.txt and server/daemon/CMakeLists.txt;
 // - an entry in Engines() of test/server/store/store_test.h, so that it passes
-//   the tests of the store, and tests of its own.
+//   the tests of the store and of server/domain and the kills of runs, and
+//   tests of its own.
 //
 // The SQL of the store is what SQLite and PostgreSQL have in common, and
 //

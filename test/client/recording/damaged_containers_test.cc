@@ -1,4 +1,4 @@
-// Files of every container, cut off or with a few flipped bits: an error or a
+// Files of messages, cut off or with a few flipped bits: an error or a
 // recording whose images can be asked for, and never the end of the process.
 #include <gtest/gtest.h>
 
