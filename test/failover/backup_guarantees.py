@@ -1,10 +1,7 @@
 """A restore from a backup and the archive."""
 
-import pathlib
-import subprocess
 import time
 
-from hub import processes
 from hub.one_machine import ADDRESS
 
 from failover import checks
@@ -14,7 +11,6 @@ from failover.running_fleet import RunningFleet
 from failover.tried import Tried, wait
 from selfcal.v1 import rig_pb2
 
-_FLEET = pathlib.Path(__file__).resolve().parents[2] / "deploy/fleet"
 _SEGMENTS = 12  # of a rig
 _SENT_S = 120
 
@@ -29,14 +25,14 @@ def restore(context: Context, tried: Tried, trials: int) -> None:
         for number in range(trials):
             _restore(context, fleet, tried, number)
     finally:
-        _command("stop", folder)
+        fleet.command("stop")
 
 
 def _restore(
     context: Context, fleet: RunningFleet, tried: Tried, number: int
 ) -> None:
     in_backup = _send(context, fleet, tried, f"backup-{number}")
-    _command("backup", fleet.folder, "--type", "incr" if number else "full")
+    fleet.command("backup", "--type", "incr" if number else "full")
     in_archive = _send(context, fleet, tried, f"archive-{number}")
     sent = [in_backup.rig_id, in_archive.rig_id]
     for text in checks.settled(fleet, sent):
@@ -46,7 +42,7 @@ def _restore(
     later = _send(context, fleet, tried, f"later-{number}")
 
     begin = time.monotonic()
-    _command("restore", fleet.folder, restore_to)
+    fleet.command("restore", restore_to)
     fleet.repair()
     tried.seconds.append(time.monotonic() - begin)
     rigs = {row[0] for row in fleet.query("SELECT id FROM rigs")}
@@ -88,16 +84,3 @@ def _send(
     device.abandon()
     device.join()
     return device
-
-
-def _command(name: str, folder: pathlib.Path, *options: str) -> None:
-    done = subprocess.run(
-        [_FLEET / name, folder, *options],
-        check=False,
-        cwd=folder.parent,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-    )
-    if done.returncode != 0:
-        raise processes.Failed(f"{name}: {done.stdout}")

@@ -65,16 +65,11 @@ def _wait_until_back(
 ) -> None:
     """Until every device has an acknowledgement of after the failure."""
     time.sleep(pause)  # what was under way is acknowledged
-    since = time.monotonic()
-    deadline = begin + _FAILOVER_S
-    late = [device for device in load.devices if not device.has_ended()]
-    while late and time.monotonic() < deadline:
-        late = [d for d in late if d.last_acknowledgement < since]
-        time.sleep(0.02)
+    late = load.wait_until_served(begin + _FAILOVER_S)
     seconds = time.monotonic() - begin
     if late:
         tried.trial(f"{what}; no acknowledgement after {seconds:.0f} s")
-        tried.fail(f"{what}: {[d.rig_id for d in late]} are not served")
+        tried.fail(f"{what}: {late} are not served")
     else:
         tried.seconds.append(seconds)
         tried.trial(f"{what}; acknowledges again after {seconds:.1f} s")

@@ -41,10 +41,9 @@ def main() -> None:
         signal.signal(number, signal.SIG_IGN)
     sys.stdin.buffer.read()
     send(signal.SIGCONT, processes_of(folder))
-    for fleet in ("fleet", "archived"):
-        if (pathlib.Path(folder) / fleet / "etc").exists():
-            command = [stop, f"{folder}/{fleet}"]
-            subprocess.run(command, check=False, stdout=subprocess.DEVNULL)
+    for file in pathlib.Path(folder).glob("*/etc/fleet.yaml"):
+        command = [stop, str(file.parent.parent)]
+        subprocess.run(command, check=False, stdout=subprocess.DEVNULL)
     # A start that was interrupted, and what else the test had begun.
     deadline = time.monotonic() + 20
     while (left := processes_of(folder)) and time.monotonic() < deadline:

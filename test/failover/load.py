@@ -94,6 +94,17 @@ class Load:
             time.sleep(0.02)
         return True
 
+    def wait_until_served(self, deadline: float) -> list:
+        """Waits until every device that still sends has an acknowledgement from
+        after this call; returns the rigs of those that have none in time.
+        """
+        since = time.monotonic()
+        late = [device for device in self.devices if not device.has_ended()]
+        while late and time.monotonic() < deadline:
+            late = [d for d in late if d.last_acknowledgement < since]
+            time.sleep(0.02)
+        return [device.rig_id for device in late]
+
     def of_kind(self, kind: str) -> list:
         return [d for d in self.devices if d.rig_id.startswith(kind)]
 

@@ -12,7 +12,7 @@ import psycopg2
 from hub import cluster, components, processes
 from hub.one_machine import ADDRESS, Fleet
 
-_START = pathlib.Path(__file__).resolve().parents[2] / "deploy/fleet/start"
+_COMMANDS = pathlib.Path(__file__).resolve().parents[2] / "deploy/fleet"
 
 
 class RunningFleet:
@@ -25,18 +25,21 @@ class RunningFleet:
 
     def create(self, replicas: int, archive: bool = False) -> None:
         options = ["--replicas", str(replicas), "--daemon", self._daemon]
-        self._start(options if archive else [*options, "--no-archive"])
+        self.command(
+            "start", *(options if archive else [*options, "--no-archive"])
+        )
         self._fleet.load()
 
     def repair(self) -> None:
         """Starts what does not run, and waits for a synchronous standby."""
         for name in self.replicas():
             self.start_replica(name)
-        self._start([])
+        self.command("start")
 
-    def _start(self, options: list) -> None:
+    def command(self, name: str, *options: str) -> None:
+        """Runs a command of deploy/fleet on this fleet."""
         done = subprocess.run(
-            [_START, self.folder, *options],
+            [_COMMANDS / name, self.folder, *options],
             check=False,
             cwd=self.folder.parent,
             text=True,
@@ -44,7 +47,7 @@ class RunningFleet:
             stderr=subprocess.STDOUT,
         )
         if done.returncode != 0:
-            raise processes.Failed(done.stdout)
+            raise processes.Failed(f"{name}: {done.stdout}")
 
     # --- Addresses.
 
