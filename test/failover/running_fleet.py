@@ -101,11 +101,19 @@ class RunningFleet:
             name: self.database(port) for name, port in ports.items()
         }
         for name in self.replicas():
-            processes.end(self.folder, name, signal.SIGTERM, 20)
+            self.stop_replica(name)
         time.sleep(3)  # until HAProxy's checks have noticed
         for name in self.replicas():
             self.start_replica(name)
         self.wait_for_replicas()
+
+    def use(self, daemon: str) -> None:
+        """Replicas that are started from now on run this program."""
+        self._fleet.values["daemon"] = daemon
+        self._fleet.save()
+
+    def stop_replica(self, name: str) -> None:
+        processes.end(self.folder, name, signal.SIGTERM, 20)
 
     def start_replica(self, name: str) -> None:
         for replica in components.selfcald(self._fleet):
@@ -130,6 +138,13 @@ class RunningFleet:
         if not file.exists():
             return ""
         return file.read_text(encoding="utf-8", errors="replace")
+
+    def metrics(self, name: str) -> str:
+        """Those of a replica; empty if it does not answer."""
+        for node in self._fleet.values["replicas"]:
+            if node["name"] == name:
+                return cluster.get(node["metrics_port"], "/metrics")[1]
+        return ""
 
     def last_scorer(self, rig_id: str) -> str:
         """The replica whose log has the rig's last score."""
