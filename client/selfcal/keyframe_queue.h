@@ -14,7 +14,7 @@
 
 namespace selfcal::client {
 
-// What makes a segment full.
+// The size at which a segment is full.
 struct SegmentSize {
   int keyframes = 40;  // at least 2 ...
   // ... or, if it is set, the duration of a segment instead.

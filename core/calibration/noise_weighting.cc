@@ -27,7 +27,7 @@ bool NoiseWeighting::Reweight() {
   for (int i = 0; descent_->converged(); ++i) {
     if (!WeightByTracks()) return false;
     if (!descent_->converged() || !options_.noise_scales) break;
-    EstimateFactors();
+    EstimateScales();
     if (!options_.reweight_noise || i == kMaxReweightings) break;
     const std::optional<Rig> next =
         selfcal::Reweight(stated_, point_->rig(), scales_);
@@ -41,12 +41,12 @@ bool NoiseWeighting::Reweight() {
 bool NoiseWeighting::WeightByTracks() {
   if (!options_.correlated_tracks) return true;
   const Eigen::MatrixXd basis = TangentBasis(point_->rig(), point_->subspace());
-  const double excess = TrackNoiseFactor(point_->Round(basis),
+  const double factor = TrackNoiseFactor(point_->Round(basis),
                                          point_->linearised(),
                                          point_->estimate(),
                                          point_->screening().landmarks);
-  track_noise_ = excess * point_->track_noise_factor();
-  if (excess < 1 + kLeastTrackNoise) return true;
+  track_noise_ = factor * point_->track_noise_factor();
+  if (factor < 1 + kLeastTrackNoise) return true;
   point_->WeightByTracks(track_noise_);
   return descent_->Repeat();
 }
@@ -62,7 +62,7 @@ double NoiseWeighting::ResidualsTo(const Rig& weights) const {
   return 1;
 }
 
-void NoiseWeighting::EstimateFactors() {
+void NoiseWeighting::EstimateScales() {
   const Eigen::MatrixXd basis = TangentBasis(point_->rig(), point_->subspace());
   // The noise scales require weights without the track noise.
   std::vector<ScreenedLandmark> landmarks = point_->screening().landmarks;

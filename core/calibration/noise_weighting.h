@@ -34,7 +34,7 @@ class NoiseWeighting {
 
  private:
   bool WeightByTracks();
-  void EstimateFactors();
+  void EstimateScales();
   // The noise that residuals show, relative to that by which `weights` weights
   // them; at most 1.
   double ResidualsTo(const Rig& weights) const;

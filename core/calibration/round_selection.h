@@ -1,4 +1,4 @@
-// What a round of a calibration is based on: the motions about the keyframes,
+// The basis of a round of a calibration: the motions about the keyframes,
 // the landmarks and observations with their weights, and the whitening of the
 // inertial links. All of it follows from an estimate, and is fixed until the
 // selection is repeated at another one.

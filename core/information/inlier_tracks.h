@@ -22,11 +22,11 @@ class InlierTracks {
 
   // Homogeneous p_G of the landmarks, 4 each.
   const double* points() const { return points_.data(); }
-  // By landmark: where the inliers of each begin, and the end of the last one;
-  // and the keyframe of each inlier (ChainShape).
+  // Begin of the inliers of each landmark, and the end of the last one; and
+  // the keyframe of each inlier (ChainShape).
   std::span<const int> tracks() const { return tracks_; }
   std::span<const int> keyframes() const { return keyframes_; }
-  // By view, with the index by landmark of each inlier of a run.
+  // Runs by view, with the index by landmark of each inlier.
   const ObservationRuns& runs() const { return runs_; }
   std::span<const int> FactorsOf(const ObservationRuns::Run& run) const {
     return std::span<const int>(factors_).subspan(run.begin,

@@ -23,7 +23,7 @@ Eigen::Vector2d RandomPixel(const CameraCalibration& camera, Random* random) {
   return {x, y};
 }
 
-// How the cameras have observed a landmark, and how it moves.
+// The observations of a landmark so far, and its motion.
 struct Sighting {
   // The keyframe and the camera of its first observation.
   int created_keyframe = 0;

@@ -38,7 +38,7 @@ class PixelErrors {
   Eigen::Vector2d InSigmas(Track* track,
                            int keyframe,
                            bool is_first_of_landmark);
-  // What the errors of a new track have in common.
+  // Draws the common part of the errors of a new track.
   void DrawPatch(Track* track);
 
   const SimulationOptions& options_;

@@ -51,10 +51,10 @@ absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<bool> AdmitByFit(UnitOfWork* tx,
-                                std::int64_t segment,
-                                const ResidualStatistics& residuals,
-                                std::optional<double> largest_fit) {
+absl::StatusOr<bool> Admit(UnitOfWork* tx,
+                           std::int64_t segment,
+                           const ResidualStatistics& residuals,
+                           std::optional<double> largest_fit) {
   if (largest_fit && residuals.fit > *largest_fit) {
     SELFCAL_RETURN_IF_ERROR(RefuseTables(tx,
                                          segment,

@@ -24,9 +24,9 @@ absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit);
 // recorded. A further reason is a value of ExclusionCause
 // (server/store/session.h) and of selfcal.v1.TableExclusion.Cause, with its
 // words in server/encode/encode_segment.cc.
-absl::StatusOr<bool> AdmitByFit(UnitOfWork* tx,
-                                std::int64_t segment,
-                                const ResidualStatistics& residuals,
-                                std::optional<double> largest_fit);
+absl::StatusOr<bool> Admit(UnitOfWork* tx,
+                           std::int64_t segment,
+                           const ResidualStatistics& residuals,
+                           std::optional<double> largest_fit);
 
 }  // namespace selfcal::server

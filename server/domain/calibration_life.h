@@ -24,7 +24,7 @@ namespace selfcal::server {
 
 bool MayBecome(CalibrationState from, CalibrationState to);
 
-// What the active version becomes when `version` does.
+// The state of the active version once `version` has replaced it.
 CalibrationState StateOfReplaced(std::int64_t active, std::int64_t version);
 
 // "rolled back".

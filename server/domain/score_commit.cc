@@ -54,7 +54,7 @@ absl::StatusOr<ScoreCommit> CommitScore(
       RemoveAgedEntries(tx, rig, segment.receive_steady_ns));
   SELFCAL_ASSIGN_OR_RETURN(
       const bool admitted,
-      AdmitByFit(tx, segment.sequence, information.residuals, largest_fit));
+      Admit(tx, segment.sequence, information.residuals, largest_fit));
   if (admitted) {
     SELFCAL_ASSIGN_OR_RETURN(
         commit.tables,

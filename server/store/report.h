@@ -28,7 +28,7 @@ absl::StatusOr<StoredRig> RigOfReport(const std::string& records,
 struct ReportRules {
   // Whether there is room for the data of a segment of this size, compressed.
   std::function<absl::StatusOr<bool>(std::int64_t bytes)> admit_data;
-  // What the active version becomes when another one does.
+  // The state of the active version once another one has replaced it.
   CalibrationState (*replaced)(std::int64_t active, std::int64_t version);
 };
 // Writes the records (Report::records), so that they are as on the device; data

@@ -544,7 +544,7 @@ class Store {
     std::int64_t oldest_ns = 0;  // time of the oldest last report; 0: none
     std::int64_t newest_ns = 0;
   };
-  // Reads a row of each of them: 15 to 40 ms for 100,000 rigs.
+  // Reads one row of each of them.
   virtual absl::StatusOr<ReportedCount> CountReported(
       std::int64_t silent_before_ns) = 0;
 

@@ -167,11 +167,7 @@ def main() -> int:
         + undeclared_dependencies(document, project)
         + missing_rows(document, project)
     )
-    for line in findings:
-        print(line)
-    if not findings:
-        print(f"{len(declared_modules(project))} modules")
-    return 1 if findings else 0
+    return layers.report(findings, f"{len(declared_modules(project))} modules")
 
 
 if __name__ == "__main__":

@@ -2,10 +2,9 @@
 """Tests architecture.py: this tree's document passes, changed ones fail."""
 
 import pathlib
-import subprocess
-import sys
-import tempfile
 import unittest
+
+from small_tree import SmallTreeTest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 CHECK = ROOT / "test/checks/architecture.py"
@@ -45,32 +44,9 @@ TREE = {
 }
 
 
-class ArchitectureTest(unittest.TestCase):
-    def run_check(self, root: pathlib.Path) -> tuple:
-        done = subprocess.run(
-            [sys.executable, CHECK, root],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        self.assertEqual(done.stderr, "")
-        return done.returncode, done.stdout.splitlines()
-
-    def check(self, changes: dict) -> tuple:
-        """Runs on the tree with these files changed: exit code, lines."""
-        with tempfile.TemporaryDirectory() as folder:
-            root = pathlib.Path(folder)
-            for name, text in {**TREE, **changes}.items():
-                (root / name).parent.mkdir(parents=True, exist_ok=True)
-                (root / name).write_text(text)
-            return self.run_check(root)
-
-    def expect_one(self, changes: dict, *words: str) -> None:
-        code, lines = self.check(changes)
-        self.assertEqual(code, 1)
-        self.assertEqual(len(lines), 1, lines)
-        for word in words:
-            self.assertIn(word, lines[0])
+class ArchitectureTest(SmallTreeTest):
+    CHECK = CHECK
+    TREE = TREE
 
     def expect_one_in_document(self, old: str, new: str, *words: str) -> None:
         document = TREE[DOCUMENT]

@@ -295,6 +295,13 @@ def tracked_files(root: pathlib.Path) -> list:
     return [file for file in listed if (root / file).is_file()]
 
 
+def report(findings: list, summary: str) -> int:
+    """Prints the findings, or the summary if there are none: the exit code."""
+    for line in findings or [summary]:
+        print(line)
+    return 1 if findings else 0
+
+
 def main() -> int:
     default = pathlib.Path(__file__).resolve().parents[2]
     root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else default
@@ -304,11 +311,9 @@ def main() -> int:
         + forbidden_dependencies(project)
         + cycles(project)
     )
-    for line in findings:
-        print(line)
-    if not findings:
-        print(f"{len(project.targets)} targets, {len(project.files)} files")
-    return 1 if findings else 0
+    return report(
+        findings, f"{len(project.targets)} targets, {len(project.files)} files"
+    )
 
 
 if __name__ == "__main__":

@@ -2,10 +2,9 @@
 """Tests layers.py on small trees: what is declared passes, the rest fails."""
 
 import pathlib
-import subprocess
-import sys
-import tempfile
 import unittest
+
+from small_tree import SmallTreeTest
 
 LAYERS = pathlib.Path(__file__).resolve().with_name("layers.py")
 
@@ -24,30 +23,9 @@ TREE = {
 }
 
 
-class LayersTest(unittest.TestCase):
-    def check(self, changes: dict) -> tuple:
-        """Runs on the tree with these files changed: exit code, lines."""
-        with tempfile.TemporaryDirectory() as folder:
-            root = pathlib.Path(folder)
-            subprocess.run(["git", "init", "-q", folder], check=True)
-            for name, text in {**TREE, **changes}.items():
-                (root / name).parent.mkdir(parents=True, exist_ok=True)
-                (root / name).write_text(text)
-            done = subprocess.run(
-                [sys.executable, LAYERS, root],
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            self.assertEqual(done.stderr, "")
-            return done.returncode, done.stdout.splitlines()
-
-    def expect_one(self, changes: dict, *words: str) -> None:
-        code, lines = self.check(changes)
-        self.assertEqual(code, 1)
-        self.assertEqual(len(lines), 1, lines)
-        for word in words:
-            self.assertIn(word, lines[0])
+class LayersTest(SmallTreeTest):
+    CHECK = LAYERS
+    TREE = TREE
 
     def test_declared_includes_pass_directly_and_through_others(self):
         self.assertEqual(self.check({})[0], 0)

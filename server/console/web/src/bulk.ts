@@ -10,7 +10,7 @@ import type {
   StartRecalibrationRequest,
 } from './contract';
 
-// What the administrator states when the changes are confirmed.
+// The statement of the administrator who confirms the changes.
 export interface Statement {
   reason: string;
   force: boolean;

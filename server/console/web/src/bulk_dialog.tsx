@@ -41,7 +41,7 @@ function Remarks(props: { caption: string; of: Remark[] }) {
   );
 }
 
-// What was made of a plan so far.
+// The changes of a plan that are made so far.
 interface Progress {
   done: number;
   instructed: number; // of those that are done

@@ -46,7 +46,7 @@ export function RigVerdict(props: { of: Calibration }) {
 
 // ------------------------------------------------------------- reports
 
-// At a hub: from when its records of the rig are, and what the device runs.
+// The last report of a device to its hub, and the program that it runs.
 export function DeviceReports(props: { of: ReportState }) {
   const { time, waiting, programVersion } = props.of;
   return (

@@ -97,7 +97,7 @@ interface Asked {
   query: Record<string, string>;
 }
 
-// What an administrator may change of all rigs that are listed, on every page.
+// The changes of all rigs that the filter finds, for an administrator.
 function Administration(props: { filter: string; withAlarms: boolean }) {
   const [asked, setAsked] = useState<Asked | null>(null);
   const query = { filter: props.filter, with_alarms: String(props.withAlarms) };
