@@ -454,17 +454,17 @@ class PipelineImpl : public Pipeline {
     if (!names_version) {
       return violations;
     }
-    const auto calibration =
-        store_->GetCalibration(rig_name, segment.calibration_version);
-    if (absl::IsNotFound(calibration.status())) {
+    const absl::StatusOr<bool> was_active =
+        store_->WasActive(rig_name, segment.calibration_version);
+    if (absl::IsNotFound(was_active.status())) {
       violations.push_back(
           {kVersionField,
            fmt::format("the rig has no version {}; send the one that the "
                        "states were estimated with",
                        segment.calibration_version)});
-    } else if (!calibration.ok()) {
-      return calibration.status();
-    } else if (calibration->activation == 0) {
+    } else if (!was_active.ok()) {
+      return was_active.status();
+    } else if (!*was_active) {
       violations.push_back(
           {kVersionField,
            fmt::format("version {} was never published; send the one that the "

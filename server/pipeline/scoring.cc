@@ -46,9 +46,9 @@ ScoringWorkers::ScoringWorkers(
       on_change_(std::move(on_change)),
       on_done_(std::move(on_done)),
       places_(options.max_backlog),
+      // Of one rig, each of the other threads scores at most one.
       queue_(claims, [this] {
-        return store()->ListUnscored(std::numeric_limits<int>::max(),
-                                     claims_->replica());
+        return store()->ListUnscored(ThreadCount(), claims_->replica());
       }) {}
 
 ScoringWorkers::~ScoringWorkers() { Stop(); }
@@ -68,7 +68,7 @@ absl::Status ScoringWorkers::Start() {
   }
   places_.Open(filled);
   queue_.Open();
-  for (int k = 0; k < std::max(1, options_.scoring_threads); ++k) {
+  for (int k = 0; k < ThreadCount(); ++k) {
     threads_.emplace_back([this] { Run(); });
   }
   return absl::OkStatus();

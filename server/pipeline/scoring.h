@@ -10,6 +10,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <algorithm>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -93,6 +94,7 @@ class ScoringWorkers {
   // returns the last result.
   absl::Status Retry(const std::function<absl::Status()>& call);
   Store* store() const { return domain_->store(); }
+  int ThreadCount() const { return std::max(1, options_.scoring_threads); }
 
   Domain* const domain_;
   RigClaims* const claims_;

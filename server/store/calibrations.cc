@@ -190,6 +190,11 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfMany(
   return listed;
 }
 
+absl::Status NoSuchCalibration(const std::string& rig, std::int64_t version) {
+  return absl::NotFoundError(
+      fmt::format("rig {} has no calibration {}", rig, version));
+}
+
 }  // namespace
 
 absl::StatusOr<std::vector<StoredCalibration>> ReadReports(
@@ -223,10 +228,7 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
                  version);
   const bool found = read.Next();
   SELFCAL_RETURN_IF_ERROR(read.status());
-  if (!found) {
-    return absl::NotFoundError(
-        fmt::format("rig {} has no calibration {}", rig, version));
-  }
+  if (!found) return NoSuchCalibration(rig, version);
   std::vector<StoredCalibration> one(1);
   SELFCAL_ASSIGN_OR_RETURN(one.front(), CalibrationFromRow(read));
   SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &one));
@@ -239,6 +241,21 @@ absl::StatusOr<StoredCalibration> ReadActiveCalibration(
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t version,
                            ActiveVersionOf(db, rig_id));
   return ReadCalibration(db, rig, version);
+}
+
+absl::StatusOr<bool> WasActive(Connection* db,
+                               const std::string& rig,
+                               std::int64_t version) {
+  Statement read(db,
+                 "SELECT EXISTS (SELECT 1 FROM activations a "
+                 "  WHERE a.rig = c.rig AND a.version = c.version) "
+                 "FROM calibrations c JOIN rigs r ON r.rig = c.rig "
+                 "WHERE r.id = ?1 AND c.version = ?2",
+                 rig,
+                 version);
+  if (read.Next()) return read.Int(0) != 0;
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return NoSuchCalibration(rig, version);
 }
 
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(

@@ -23,6 +23,11 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
 absl::StatusOr<StoredCalibration> ReadActiveCalibration(Connection* db,
                                                         const std::string& rig);
 
+// Store::WasActive.
+absl::StatusOr<bool> WasActive(Connection* db,
+                               const std::string& rig,
+                               std::int64_t version);
+
 // Store::GetReports.
 absl::StatusOr<std::vector<StoredCalibration>> ReadReports(
     Connection* db, const std::vector<VersionId>& versions);

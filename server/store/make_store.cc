@@ -183,9 +183,10 @@ class DatabaseStore final : public Store {
   }
 
   absl::StatusOr<std::vector<Unscored>> ListUnscored(
-      int limit, const std::string& replica) override {
-    return ReadForService(
-        [&](Connection* db) { return ListUnscoredRows(db, limit, replica); });
+      int of_each_rig, const std::string& replica) override {
+    return ReadForService([&](Connection* db) {
+      return ListUnscoredRows(db, of_each_rig, replica);
+    });
   }
 
   absl::StatusOr<std::int64_t> CountUnscored(const std::string& rig) override {
@@ -214,6 +215,13 @@ class DatabaseStore final : public Store {
   absl::StatusOr<StoredCalibration> GetActiveCalibration(
       const std::string& rig) override {
     return Read([&](Connection* db) { return ReadActiveCalibration(db, rig); });
+  }
+
+  absl::StatusOr<bool> WasActive(const std::string& rig,
+                                 std::int64_t version) override {
+    return Read([&](Connection* db) {
+      return server::WasActive(db, rig, version);
+    });
   }
 
   absl::StatusOr<std::vector<StoredCalibration>> GetReports(

@@ -10,6 +10,7 @@
 #include "server/store/driver/transaction.h"
 #include "server/store/own_rig.h"
 #include "server/store/rigs.h"
+#include "server/store/unscored_rigs.h"
 
 namespace selfcal::server {
 namespace {
@@ -111,10 +112,11 @@ class ReplicasOfDatabase final : public Replicas {
     SELFCAL_RETURN_IF_ERROR(db_->ReadForService([&](Connection* db) {
       rigs.clear();
       Statement read(db,
-                     "SELECT id FROM rigs r WHERE rig IN "
-                     "  (SELECT rig FROM segments WHERE state = 1 "
-                     "   UNION SELECT rig FROM runs WHERE state IN (1, 2)) "
-                     "AND " +
+                     WithUnscoredRigs() +
+                         "SELECT id FROM rigs r WHERE rig IN "
+                         "  (SELECT rig FROM unscored_rigs "
+                         "   UNION SELECT rig FROM runs WHERE state IN (1, 2)) "
+                         "AND " +
                          IsOwnRig("r.rig") +
                          " "
                          "AND NOT EXISTS (SELECT 1 FROM claims c "

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <limits>
+
 #include "server/status/status_macros.h"
 #include "server/store/driver/statement.h"
 #include "server/store/exclusions.h"
@@ -9,6 +12,7 @@
 #include "server/store/own_rig.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_path.h"
+#include "server/store/unscored_rigs.h"
 
 namespace selfcal::server {
 namespace {
@@ -253,20 +257,24 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
 }
 
 absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
-    Connection* db, int limit, const std::string& replica) {
-  Statement read(db,
-                 "SELECT r.id, s.session, s.session_index, s.sequence, "
-                 "  s.observations + s.imu_samples "
-                 "FROM segments s JOIN rigs r USING (rig) "
-                 "WHERE s.state = 1 AND (?2 = '' OR EXISTS "
-                 "  (SELECT 1 FROM claims c "
-                 "   WHERE c.rig = s.rig AND c.replica = ?2)) "
-                 "AND " +
-                     IsOwnRig("s.rig") +
-                     " "
-                     "ORDER BY s.rig, s.sequence LIMIT ?1",
-                 limit,
-                 replica);
+    Connection* db, int of_each_rig, const std::string& replica) {
+  Statement read(
+      db,
+      WithUnscoredRigs() +
+          "SELECT r.id, s.session, s.session_index, s.sequence, "
+          "  s.observations + s.imu_samples "
+          "FROM unscored_rigs u JOIN rigs r ON r.rig = u.rig "
+          "JOIN segments s ON s.rig = u.rig AND s.state = 1 "
+          "  AND s.sequence < coalesce((SELECT n.sequence FROM segments n "
+          "    WHERE n.state = 1 AND n.rig = u.rig "
+          "    ORDER BY n.sequence LIMIT 1 OFFSET ?1), ?3) "
+          "WHERE (?2 = '' OR EXISTS (SELECT 1 FROM claims c "
+          "  WHERE c.rig = u.rig AND c.replica = ?2)) "
+          "AND " +
+          IsOwnRig("u.rig") + " ORDER BY s.rig, s.sequence",
+      of_each_rig,
+      replica,
+      std::numeric_limits<std::int64_t>::max());
   std::vector<Store::Unscored> unscored;
   while (read.Next()) {
     unscored.push_back(

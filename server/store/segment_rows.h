@@ -74,7 +74,7 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
 
 // Store::ListUnscored.
 absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
-    Connection* db, int limit, const std::string& replica);
+    Connection* db, int of_each_rig, const std::string& replica);
 // Store::CountUnscored.
 absl::StatusOr<std::int64_t> CountUnscoredRows(Connection* db,
                                                const std::string& rig);

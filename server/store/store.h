@@ -418,9 +418,10 @@ class Store {
   // Exclusions of the segment, as far as they were recorded.
   virtual absl::StatusOr<std::vector<Exclusion>> ListExclusions(
       const std::string& rig, const SegmentKey& key) = 0;
-  // Unscored segments of the rigs that no device reports, or of those that a
-  // replica has claimed.
-  // Those of one rig follow each other, in the order of their arrival.
+  // The `of_each_rig` oldest unscored segments of the rigs that no device
+  // reports, or of those of them that a replica has claimed. Those of one rig
+  // follow each other, in the order of their arrival. Reads no others, however
+  // many there are.
   struct Unscored {
     std::string rig;
     SegmentKey key;
@@ -428,7 +429,7 @@ class Store {
     std::int64_t readings = 0;  // observations and samples of the IMU
   };
   virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(
-      int limit, const std::string& replica = "") = 0;
+      int of_each_rig, const std::string& replica = "") = 0;
   // Number of unscored segments of the rig.
   virtual absl::StatusOr<std::int64_t> CountUnscored(
       const std::string& rig) = 0;
@@ -443,6 +444,10 @@ class Store {
       const std::string& rig, std::int64_t version) = 0;
   virtual absl::StatusOr<StoredCalibration> GetActiveCalibration(
       const std::string& rig) = 0;
+  // Whether the version has ever been the active one. Reads nothing of its
+  // content.
+  virtual absl::StatusOr<bool> WasActive(const std::string& rig,
+                                         std::int64_t version) = 0;
   // Rig, version, report and seconds of those that exist and are not damaged,
   // in any order.
   virtual absl::StatusOr<std::vector<StoredCalibration>> GetReports(

@@ -105,6 +105,11 @@ TEST_P(LifecycleTest, CandidateIsKeptUntilItIsJudged) {
   ASSERT_TRUE(kept.ok()) << kept.status();
   EXPECT_EQ(kept->state, CalibrationState::kCandidate);
   EXPECT_EQ(kept->activation, 0);
+  EXPECT_FALSE(store_->WasActive("a", kept->version).value());
+  EXPECT_TRUE(store_->WasActive("a", 1).value());
+  EXPECT_TRUE(
+      absl::IsNotFound(store_->WasActive("a", kept->version + 1).status()));
+  EXPECT_TRUE(absl::IsNotFound(store_->WasActive("nobody", 1).status()));
   EXPECT_EQ(kept->schema_version, GetParam().schema_version);
   EXPECT_EQ(kept->settings, candidate->settings);
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);

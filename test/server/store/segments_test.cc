@@ -117,7 +117,21 @@ TEST_P(SegmentsTest, UnscoredOfARigAreListedInTheOrderOfArrival) {
   }
   EXPECT_THAT(indices["a"], ElementsAre(2));
   EXPECT_THAT(indices["b"], ElementsAre(1, 0));
-  EXPECT_EQ(store_->ListUnscored(1)->size(), 1u);
+}
+
+TEST_P(SegmentsTest, TheOldestUnscoredOfEachRigAreListed) {
+  for (const char* rig : {"a", "b", "c"}) CreateTestRig(rig);
+  for (const int index : {4, 1, 3}) Put("a", index);
+  Put("c", 7);
+  const auto unscored = store_->ListUnscored(2);
+  ASSERT_TRUE(unscored.ok()) << unscored.status();
+  std::map<std::string, std::vector<std::int64_t>> indices;
+  for (const auto& segment : *unscored) {
+    indices[segment.rig].push_back(segment.key.index);
+  }
+  EXPECT_EQ(indices,
+            (std::map<std::string, std::vector<std::int64_t>>{{"a", {4, 1}},
+                                                              {"c", {7}}}));
 }
 
 // The next segment takes the number of the newest one.
