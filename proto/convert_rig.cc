@@ -197,6 +197,9 @@ v1::Rig ToProto(const Rig& rig) {
     added->set_pattern(setting.pattern);
     added->set_value(setting.value);
   }
+  if (rig.prior_mean) {
+    *message.mutable_prior_mean() = ToProto(*rig.prior_mean);
+  }
   message.mutable_fixed()->Add(rig.fixed.begin(), rig.fixed.end());
   message.set_selection(ToProto(rig.selection));
   message.set_table_size(rig.table_size);
@@ -233,6 +236,12 @@ std::vector<Violation> FromProto(const v1::Rig& message,
     violations.insert(violations.end(), more.begin(), more.end());
   } else {
     violations.push_back({prefix + "factory", "is missing"});
+  }
+  if (message.has_prior_mean()) {
+    auto more = FromProto(message.prior_mean(),
+                          prefix + "prior_mean.",
+                          &read.prior_mean.emplace());
+    violations.insert(violations.end(), more.begin(), more.end());
   }
   if (message.has_imu_noise()) {
     read.imu_noise = Value(message.imu_noise());

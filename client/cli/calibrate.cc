@@ -98,6 +98,9 @@ int MoveToStart(std::optional<double> temperature_c,
   Rig known;
   const auto faults = FromProto(recorded->rig, "rig", &known);
   if (!faults.empty()) return kDone;  // the daemon lists them
+  // A start replaces the prior mean of the rig as well.
+  known.factory = PriorMean(known);
+  known.prior_mean.reset();
   // Blocks that the daemon would add, and groups.
   AddEstimatedBlocks(known.blocks, &known.factory);
   known.groups = DefaultGroups(known.blocks, known.factory);
@@ -114,6 +117,7 @@ int MoveToStart(std::optional<double> temperature_c,
   progress.Clear();
   if (start.ok()) {
     *recorded->rig.mutable_factory() = ToProto(start->theta);
+    recorded->rig.clear_prior_mean();
     return kDone;
   }
   const bool needed = std::any_of(

@@ -17,6 +17,7 @@ namespace {
 // a calibration uses it.
 Rig WithoutSecondImu(Rig rig) {
   rig.factory.imu1.reset();
+  if (rig.prior_mean) rig.prior_mean->imu1.reset();
   return rig;
 }
 

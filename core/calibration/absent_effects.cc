@@ -28,6 +28,7 @@ struct Extended {
 
 Extended WithEffects(const Rig& rig, const Calibration& theta) {
   Extended all{rig, theta};
+  all.rig.prior_mean.reset();  // it lacks the effects
   if (theta.imu.accel_position.size() == 0) {
     // The axes relative to that of x, which defines the origin.
     all.rig.factory.imu.accel_position.setZero(9);

@@ -8,7 +8,7 @@ namespace selfcal {
 
 ThetaPrior FactoryPrior(const Rig& rig) {
   const Eigen::VectorXd sigmas = PriorSigmas(rig);
-  ThetaPrior prior{rig.factory,
+  ThetaPrior prior{PriorMean(rig),
                    Eigen::MatrixXd::Zero(sigmas.size(), sigmas.size())};
   for (const int i : FreeComponents(rig)) {
     prior.information(i, i) = 1 / (sigmas(i) * sigmas(i));

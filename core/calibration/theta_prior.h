@@ -16,7 +16,7 @@ struct ThetaPrior {
   Eigen::MatrixXd information;  // D x D, tangent at centre, semidefinite
 };
 
-// PriorSigmas(rig) about the factory calibration.
+// The prior of a rig: PriorSigmas(rig) about PriorMean(rig).
 ThetaPrior FactoryPrior(const Rig& rig);
 
 // Prior from a calibration with its covariance (D x D) for some components,

@@ -19,14 +19,14 @@ class FusionProblem {
  public:
   FusionProblem(const Rig& rig, std::span<const SegmentInformation> segments)
       : rig_(rig), components_(rig), segments_(segments) {
-    prior_.theta0 = rig.factory;
+    prior_.theta0 = PriorMean(rig);
     prior_.Lambda = components_.prior().cwiseAbs2().cwiseInverse().asDiagonal();
     prior_.eta.setZero(components_.size());
   }
 
   FusedEstimate Solve() {
     FusedEstimate result;
-    result.theta = rig_.factory;
+    result.theta = prior_.theta0;
     for (int i = 0; i < kMaxSteps; ++i) {
       Linearise(result.theta);
       const Eigen::VectorXd step = posterior_.solve(posterior_eta_);

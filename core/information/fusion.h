@@ -61,7 +61,7 @@ struct FusedEstimate {
 };
 
 // Sums the information of all segments and of the rig's prior about
-// rig.factory. Segments may have been scored at different calibrations; each
+// PriorMean(rig). Segments may have been scored at different calibrations; each
 // must have the shape of rig.factory. Fixed components keep the factory value.
 FusedEstimate Fuse(const Rig& rig,
                    std::span<const SegmentInformation> segments);

@@ -204,6 +204,16 @@ bool SameShape(const Calibration& a, const Calibration& b) {
                   !HasSlopes(a));
 }
 
+bool SameImages(const Calibration& a, const Calibration& b) {
+  for (std::size_t j = 0; j < a.cameras.size(); ++j) {
+    if (a.cameras[j].width_px != b.cameras[j].width_px ||
+        a.cameras[j].height_px != b.cameras[j].height_px) {
+      return false;
+    }
+  }
+  return true;
+}
+
 Eigen::VectorXd ReadableValues(const Calibration& theta) {
   // Difference to the calibration in which everything is zero: rotations become
   // Log(q), scalars remain.

@@ -163,6 +163,9 @@ Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
 // are slopes.
 bool SameShape(const Calibration& a, const Calibration& b);
 
+// Images of the same size; both must have the same number of cameras.
+bool SameImages(const Calibration& a, const Calibration& b);
+
 // Value of each component for display: the scalar itself, and for a rotation
 // the component of its rotation vector Log(q) [rad]. Order as in the tangent.
 Eigen::VectorXd ReadableValues(const Calibration& theta);

@@ -225,6 +225,10 @@ std::vector<char> EstimatedTimeOffsets(const Rig& rig) {
   return estimated;
 }
 
+const Calibration& PriorMean(const Rig& rig) {
+  return rig.prior_mean ? *rig.prior_mean : rig.factory;
+}
+
 Eigen::VectorXd PriorSigmas(const Rig& rig) {
   constexpr double kDefaultInReferenceSigmas = 10;
   const auto components = TangentComponents(rig.factory);

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -106,6 +107,10 @@ struct Rig {
   // later ones take precedence. Default: 10 sigma_ref, or what a block
   // declares.
   std::vector<ComponentSetting> prior_sigmas;
+  // Mean of the prior, e.g. that of the devices of a cohort; nullopt: the
+  // factory calibration. It has the shape of the factory calibration, and its
+  // values in components that are not estimated. Read it by PriorMean.
+  std::optional<Calibration> prior_mean = std::nullopt;
   // Patterns of components that are never estimated.
   std::vector<std::string> fixed;
   // Later ones take precedence. Default: as the blocks are declared.
@@ -137,6 +142,10 @@ std::vector<int> FreeComponents(const Rig& rig);
 // Nonzero for each camera whose time offset is estimated.
 std::vector<char> EstimatedTimeOffsets(const Rig& rig);
 
+// Mean of the prior on theta, about which PriorSigmas hold. The reference is
+// valid as long as `rig` is.
+const Calibration& PriorMean(const Rig& rig);
+
 // Prior standard deviation of every tangent component, in its unit.
 Eigen::VectorXd PriorSigmas(const Rig& rig);
 
@@ -148,7 +157,9 @@ Eigen::VectorXd ReferenceSigmas(const Rig& rig);
 // nothing or share a name, patterns that match nothing, nothing estimated.
 // Names of groups follow the rules of the id, and a group has at least one
 // component that is not fixed; with a joint selection, no group has the name of
-// its table. Paths of the calibration begin with "factory".
+// its table. A prior mean is a valid calibration with the shape and the images
+// of the factory calibration, and equal to it in components that are not
+// estimated. Paths of the calibrations begin with "factory" and "prior_mean".
 std::vector<Violation> Validate(const Rig& rig);
 
 // Applies the same rules to a calibration alone; paths begin with `prefix` and

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/model/parameter_blocks.h"
@@ -47,6 +48,8 @@ constexpr PlausibleRange kPixelSigma = {1e-3, 1e3};
 constexpr PlausibleRange kGravity = {0.1, 100};  // Ceres to Jupiter
 // A prior sigma, in reference sigmas of its component.
 constexpr PlausibleRange kPriorRatio = {1e-6, 1e6};
+// Rounding of a value that is not estimated, in reference sigmas.
+constexpr double kRounding = 1e-9;
 
 void CheckRange(const std::string& field,
                 double value,
@@ -216,6 +219,35 @@ void CheckPriorSigmas(const Rig& rig,
   }
 }
 
+// `components` are those of the factory calibration.
+void CheckPriorMean(const Rig& rig,
+                    const std::vector<TangentComponent>& components,
+                    ViolationList* list) {
+  if (!rig.prior_mean) return;
+  std::vector<Violation> faults = Validate(*rig.prior_mean, "prior_mean");
+  for (Violation& fault : faults) {
+    list->Add(std::move(fault.field), std::move(fault.message));
+  }
+  if (!faults.empty()) return;
+  if (!SameShape(*rig.prior_mean, rig.factory) ||
+      !SameImages(*rig.prior_mean, rig.factory)) {
+    list->Add("prior_mean",
+              "has other cameras, IMUs, parameter blocks or reference "
+              "temperature than factory");
+    return;
+  }
+  Eigen::VectorXd difference = BoxMinus(*rig.prior_mean, rig.factory);
+  for (const int k : FreeComponents(rig)) difference(k) = 0;
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    const double off = std::abs(difference(static_cast<Eigen::Index>(k)));
+    if (off <= kRounding * components[k].sigma_ref) continue;
+    list->Add("prior_mean",
+              "differs from factory in " + components[k].name +
+                  ", which the rig does not estimate; send the factory value");
+    return;
+  }
+}
+
 void CheckSelection(const Rig& rig, ViolationList* list) {
   if (rig.table_size < 1 || rig.table_size > kMaxTableSize) {
     list->Add("table_size",
@@ -255,6 +287,7 @@ std::vector<Violation> Validate(const Rig& rig) {
     const auto components = TangentComponents(rig.factory);
     CheckGroups(rig, components, &list);
     CheckPriorSigmas(rig, components, &list);
+    CheckPriorMean(rig, components, &list);
     CheckPatterns(components, "fixed", rig.fixed, &list);
     CheckBlocks(rig, &list);
     if (FreeComponents(rig).empty()) {

@@ -102,7 +102,7 @@ PriorAgreement CompareWithPrior(const Rig& rig,
   const std::vector<int> free = FreeComponents(rig);
   const Eigen::VectorXd sigmas = PriorSigmas(rig)(free);
   const ThetaInformation all =
-      DeviceInformation(rig, theta, covariance, rig.factory);
+      DeviceInformation(rig, theta, covariance, PriorMean(rig));
   const Whitened device = Whiten(
       {Eigen::VectorXd::Zero(sigmas.size()), sigmas.cwiseAbs2().asDiagonal()},
       {all.Lambda(free, free), all.eta(free)});

@@ -49,7 +49,7 @@ struct PriorAgreement {
 };
 
 // Compares the data of a device with the prior of its rig, PriorSigmas(rig)
-// about rig.factory. `theta` with `covariance` (D x D, tangent at theta) is
+// about PriorMean(rig). `theta` with `covariance` (D x D, tangent at theta) is
 // that of a calibration run (DeviceInformation).
 PriorAgreement CompareWithPrior(const Rig& rig,
                                 const Calibration& theta,

@@ -9,6 +9,7 @@ namespace selfcal {
 Rig DescribeNewDevice(Rig rig, const Cohort& cohort) {
   const DevicePrediction device = PredictDevice(cohort);
   rig.factory = BoxPlus(cohort.reference, device.mean);
+  rig.prior_mean.reset();
   rig.prior_sigmas.clear();
   Eigen::Index k = 0;
   for (const TangentComponent& component : TangentComponents(rig.factory)) {

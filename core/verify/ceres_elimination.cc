@@ -67,6 +67,7 @@ std::vector<double> RootMeanSquares(const Eigen::VectorXd& whitened) {
 Rig WithoutSlopes(const Rig& rig) {
   Rig plain = rig;
   if (!HasSlopes(rig.factory)) return plain;
+  plain.prior_mean.reset();  // it has slopes
   plain.factory =
       AtTemperature(rig.factory, rig.factory.reference_temperature_c);
   plain.fixed.clear();

@@ -126,6 +126,7 @@ CalibrationAtTemperature AtTemperature(StoredCalibration calibration,
   }
   calibration.theta = AtTemperature(calibration.theta, temperature_c);
   rig.rig.factory = AtTemperature(rig.rig.factory, temperature_c);
+  rig.rig.prior_mean.reset();  // it has slopes
   return {std::move(calibration), std::move(rig)};
 }
 

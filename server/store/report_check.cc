@@ -15,16 +15,6 @@ absl::Status Bad(const std::string& what) {
   return absl::InvalidArgumentError(what);
 }
 
-bool SameImages(const Calibration& a, const Calibration& b) {
-  for (std::size_t j = 0; j < a.cameras.size(); ++j) {
-    if (a.cameras[j].width_px != b.cameras[j].width_px ||
-        a.cameras[j].height_px != b.cameras[j].height_px) {
-      return false;
-    }
-  }
-  return true;
-}
-
 absl::Status CheckTheta(const Calibration& theta, const Calibration& factory) {
   if (!SameShape(theta, factory) || !SameImages(theta, factory)) {
     return Bad("a calibration has other sensors or parameters than its rig");

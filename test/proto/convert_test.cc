@@ -92,6 +92,8 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
 void ExpectSame(const Rig& a, const Rig& b) {
   EXPECT_EQ(a.id, b.id);
   ExpectSame(a.factory, b.factory);
+  ASSERT_EQ(a.prior_mean.has_value(), b.prior_mean.has_value());
+  if (a.prior_mean) ExpectSame(*a.prior_mean, *b.prior_mean);
   for (const auto noise : {&ImuNoise::gyro_noise_density,
                            &ImuNoise::accel_noise_density,
                            &ImuNoise::gyro_bias_random_walk,

@@ -137,6 +137,7 @@ class RandomValues {
       rig.imu1_noise = {Double(), Double(), Double(), Double()};
       rig.imu1_full_scale = {1.0 + Int(0, 99), 1.0 + Int(0, 999)};
     }
+    if (Int(0, 1) == 1) rig.prior_mean = Theta();
     return rig;
   }
 

@@ -191,6 +191,45 @@ TEST(Fuse, WithoutSegmentsIsThePrior) {
   EXPECT_TRUE(fused.covariance.isApprox(prior, 1e-12));
 }
 
+// Stored information does not contain the prior: with another mean, the same
+// segments give the closed form, as in a rig that was created with this mean.
+TEST(Fuse, FollowsAChangedPriorMean) {
+  std::mt19937 random(8);
+  // Small enough that the curvature of rotations does not matter.
+  constexpr double kSmall = 1e-6;
+  const Rig rig = AllEstimated(HandheldRig("handheld"));
+  const Eigen::VectorXd sigmas = PriorSigmas(rig);
+  const Calibration truth = Moved(rig, rig.factory, kSmall, &random);
+  const std::vector<SegmentInformation> segments = {
+      LinearSegment(rig, rig.factory, truth, 9, 4, kSmall, &random),
+      LinearSegment(rig, rig.factory, truth, 9, 4, kSmall, &random)};
+  Rig given = rig;
+  given.prior_mean = Moved(rig, rig.factory, kSmall, &random);
+  const Eigen::VectorXd mean = BoxMinus(*given.prior_mean, rig.factory);
+  const Eigen::MatrixXd prior = sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd Lambda =
+      prior + segments[0].Lambda + segments[1].Lambda;
+  const Eigen::MatrixXd covariance =
+      sigmas.asDiagonal() *
+      Eigen::MatrixXd(sigmas.asDiagonal() * Lambda * sigmas.asDiagonal())
+          .inverse() *
+      sigmas.asDiagonal();
+  const Eigen::VectorXd expected =
+      covariance * (prior * mean + segments[0].eta + segments[1].eta);
+  const FusedEstimate fused = Fuse(given, segments);
+  const auto off = [&](const Calibration& theta, const Eigen::VectorXd& from) {
+    return (BoxMinus(theta, rig.factory) - from).cwiseQuotient(sigmas).norm();
+  };
+  EXPECT_LT(off(fused.theta, expected), 1e-4 * kSmall);
+  EXPECT_GT(off(Fuse(rig, segments).theta, expected), 0.1 * kSmall);
+  EXPECT_TRUE(fused.covariance.isApprox(covariance, 1e-5));
+  Rig created = rig;
+  created.factory = *given.prior_mean;
+  const FusedEstimate same = Fuse(created, segments);
+  EXPECT_LT(BoxMinus(same.theta, fused.theta).norm(), 1e-15);
+  EXPECT_TRUE(same.covariance.isApprox(fused.covariance, 1e-12));
+}
+
 TEST(Fuse, FixedComponentsDoNotChange) {
   std::mt19937 random(6);
   Rig rig = HandheldRig("handheld");

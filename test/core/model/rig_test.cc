@@ -242,5 +242,13 @@ TEST(PriorSigmas, LaterSettingsWin) {
   }
 }
 
+TEST(PriorMean, IsTheFactoryCalibrationUnlessTheRigHasOne) {
+  Rig rig = RandomRig();
+  EXPECT_EQ(&PriorMean(rig), &rig.factory);
+  rig.prior_mean = rig.factory;
+  rig.prior_mean->cameras[0].f.x() += 1;
+  EXPECT_EQ(PriorMean(rig).cameras[0].f.x(), rig.factory.cameras[0].f.x() + 1);
+}
+
 }  // namespace
 }  // namespace selfcal

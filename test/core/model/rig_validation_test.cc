@@ -233,5 +233,50 @@ TEST(ValidateRig, ImplausibleValuesAreNamed) {
   }
 }
 
+TEST(ValidateRig, PriorMeanIsACalibrationLikeTheFactorys) {
+  Rig rig = ValidRig();
+  rig.prior_mean = rig.factory;
+  EXPECT_THAT(Validate(rig), IsEmpty());
+  rig.prior_mean->cameras[0].f.x() += 5;
+  rig.prior_mean->imu.s_g.y() += 0.01;
+  EXPECT_THAT(Validate(rig), IsEmpty());
+  const std::vector<RigCorruption> corruptions = {
+      {"prior_mean.cameras[0].f",
+       [](Rig* r) { r->prior_mean->cameras[0].f.x() = -250; }},
+      {"prior_mean.imu.m_g", [](Rig* r) { r->prior_mean->imu.m_g.x() = kNan; }},
+      {"prior_mean", [](Rig* r) { r->prior_mean->cameras.pop_back(); }},
+      {"prior_mean", [](Rig* r) { r->prior_mean->cameras[0].width_px += 1; }},
+      {"prior_mean",
+       [](Rig* r) { r->prior_mean->cameras[0].line_delay_s = 1e-5; }},
+  };
+  for (const RigCorruption& corruption : corruptions) {
+    Rig corrupt = rig;
+    corruption.apply(&corrupt);
+    EXPECT_THAT(ViolatedFields(Validate(corrupt)),
+                ElementsAre(corruption.field));
+  }
+}
+
+// The same for a component that is fixed, and one of a block that is off.
+TEST(ValidateRig, PriorMeanIsTheFactorysInWhatIsNotEstimated) {
+  for (const bool is_fixed : {true, false}) {
+    Rig rig = ValidRig();
+    rig.prior_mean = rig.factory;
+    if (is_fixed) {
+      rig.prior_mean->cameras[1].distortion[0] *= 1.001;
+    } else {
+      rig.prior_mean->cameras[1].time_offset_s += 1e-4;
+    }
+    const std::vector<Violation> violations = Validate(rig);
+    ASSERT_THAT(ViolatedFields(violations), ElementsAre("prior_mean"));
+    EXPECT_THAT(
+        violations[0].message,
+        testing::HasSubstr(is_fixed ? "cam1.distortion" : "cam1.time_offset"));
+    rig.fixed.clear();
+    rig.blocks = {{"*.time_offset", true}};
+    EXPECT_THAT(Validate(rig), IsEmpty());
+  }
+}
+
 }  // namespace
 }  // namespace selfcal

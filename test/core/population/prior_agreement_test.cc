@@ -128,5 +128,18 @@ TEST_F(PriorAgreementTest, FixedComponentsAreNotCompared) {
   EXPECT_EQ(Calibrate(1, 500, 1000).agreement.degrees, before - 2);
 }
 
+// The mean of another cohort, 4 spreads away, of devices like the factory's.
+TEST_F(PriorAgreementTest, AWrongPriorMeanIsFound) {
+  EXPECT_EQ(Calibrate(0.5, 13, 30).agreement.error_ratio, 1);
+  const Eigen::VectorXd sigmas = PriorSigmas(rig_);
+  Eigen::VectorXd offset = Eigen::VectorXd::Zero(sigmas.size());
+  for (const int k : FreeComponents(rig_)) offset(k) = 4 * sigmas(k);
+  rig_.prior_mean = BoxPlus(rig_.factory, offset);
+  const PriorAgreement agreement = Calibrate(0.5, 13, 30).agreement;
+  EXPECT_LT(agreement.probability, 1e-4);
+  EXPECT_NEAR(agreement.prior_error_ratio, 4, 2);
+  EXPECT_GT(agreement.error_ratio, 1.5);
+}
+
 }  // namespace
 }  // namespace selfcal

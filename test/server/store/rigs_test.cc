@@ -15,6 +15,8 @@ TEST_P(RigsTest, RigComesBackToTheBitAfterReopening) {
   rig.retrigger_fraction = 0.7;
   rig.factory.cameras[0].time_offset_s = 1.0 / 77;
   rig.blocks = {{"*.time_offset", true}};
+  rig.prior_mean = rig.factory;
+  rig.prior_mean->cameras[0].f.x() += 1.0 / 7;
   const auto created = domain_->CreateRig(rig);
   ASSERT_TRUE(created.ok()) << created.status();
   Reopen();
@@ -22,6 +24,8 @@ TEST_P(RigsTest, RigComesBackToTheBitAfterReopening) {
   ASSERT_TRUE(stored.ok()) << stored.status();
   EXPECT_EQ(stored->create_time_ns, created->create_time_ns);
   ExpectSameCalibration(stored->rig.factory, rig.factory);
+  ASSERT_TRUE(stored->rig.prior_mean.has_value());
+  ExpectSameCalibration(*stored->rig.prior_mean, *rig.prior_mean);
   EXPECT_EQ(stored->rig.imu_noise.gyro_noise_density,
             rig.imu_noise.gyro_noise_density);
   EXPECT_EQ(PriorSigmas(stored->rig), PriorSigmas(rig));
