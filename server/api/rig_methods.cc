@@ -34,6 +34,7 @@ absl::StatusOr<StoredRig> ReadRig(const v1::Rig& message, Age age) {
   if (!violations.empty()) return InvalidFields(violations);
   if (age == Age::kNew) {
     AddEstimatedBlocks(rig.blocks, &rig.factory);
+    if (rig.prior_mean) AddEstimatedBlocks(rig.blocks, &*rig.prior_mean);
     if (message.groups().empty()) {
       rig.groups = DefaultGroups(rig.blocks, rig.factory);
     }
@@ -126,6 +127,9 @@ absl::StatusOr<v1::Rig> UpdateRig(const ApiContext& context,
                                   const v1::UpdateRigRequest& request) {
   const auto id = ParseRigName(request.rig().name());
   if (!id) return BadName("rig.name", "rigs/{rig}");
+  if (!request.reason().empty() && !IsReason(request.reason())) {
+    return InvalidFields({{"reason", std::string(kReasonRule)}});
+  }
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> fields,
                            FieldsToUpdate(request));
   const auto change =
@@ -144,8 +148,8 @@ absl::StatusOr<v1::Rig> UpdateRig(const ApiContext& context,
     rig.MergeFrom(set);
     return ReadRig(rig, Age::kExisting);
   };
-  const auto updated =
-      context.pipeline->UpdateRig(*id, change, call.caller.name);
+  const auto updated = context.pipeline->UpdateRig(
+      *id, change, call.caller.name, request.reason());
   if (!updated.ok()) {
     return About(updated.status(), {kRigType, request.rig().name(), {}});
   }

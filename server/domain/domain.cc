@@ -155,9 +155,10 @@ absl::StatusOr<StoredRig> Domain::CreateRig(const StoredRig& rig) {
 
 absl::StatusOr<RigUpdate> Domain::UpdateRig(const std::string& rig,
                                             const RigChange& change,
-                                            const std::string& caller) {
+                                            const std::string& caller,
+                                            const std::string& reason) {
   return ChangeOwnRig(store_, rig, clock_(), [&](UnitOfWork* tx) {
-    return server::UpdateRig(tx, change, caller);
+    return server::UpdateRig(tx, change, caller, reason);
   });
 }
 

@@ -66,7 +66,8 @@ class Domain {
   // UpdateRig of rig_update.h.
   absl::StatusOr<RigUpdate> UpdateRig(const std::string& rig,
                                       const RigChange& change,
-                                      const std::string& caller);
+                                      const std::string& caller,
+                                      const std::string& reason = "");
   // DeleteRig of deletion.h.
   absl::StatusOr<int> DeleteRig(const std::string& rig,
                                 const std::string& caller,

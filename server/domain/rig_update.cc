@@ -16,6 +16,7 @@ namespace {
 std::string Unchanging(StoredRig rig) {
   rig.policy = {};
   rig.labels.clear();
+  rig.rig.prior_mean.reset();
   rig.rig.prior_sigmas.clear();
   rig.rig.min_gain_nats = 0;
   rig.rig.retrigger_fraction = 0;
@@ -29,22 +30,26 @@ std::string Unchanging(StoredRig rig) {
 
 absl::StatusOr<RigUpdate> UpdateRig(UnitOfWork* tx,
                                     const RigChange& change,
-                                    const std::string& caller) {
+                                    const std::string& caller,
+                                    const std::string& reason) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig before, ReadRig(tx));
   SELFCAL_ASSIGN_OR_RETURN(StoredRig after, change(before));
   after.create_time_ns = before.create_time_ns;
   if (Unchanging(before) != Unchanging(after)) {
     return absl::InvalidArgumentError(
-        "only labels, prior_sigmas, thresholds, ages, reweight_noise, imu and "
-        "imu1 of a rig can change: what is stored was computed with the rest; "
-        "create another rig");
+        "only labels, prior_mean, prior_sigmas, thresholds, ages, "
+        "reweight_noise, imu and imu1 of a rig can change: what is stored was "
+        "computed with the rest; create another rig");
   }
   if (SerializeRig(before) == SerializeRig(after)) {
     return RigUpdate{std::move(after), false};
   }
   SELFCAL_RETURN_IF_ERROR(WriteRig(tx, after));
   SELFCAL_RETURN_IF_ERROR(AppendEvent(
-      tx, EventKind::kRigUpdated, fmt::format("changed by {}", caller)));
+      tx,
+      EventKind::kRigUpdated,
+      fmt::format(
+          "changed by {}{}{}", caller, reason.empty() ? "" : ": ", reason)));
   const bool rescore = PriorSigmas(before.rig) != PriorSigmas(after.rig);
   return RigUpdate{std::move(after), rescore};
 }

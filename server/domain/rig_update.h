@@ -22,11 +22,14 @@ struct RigUpdate {
 };
 
 // Applies the change. INVALID_ARGUMENT if it changes what the device is, or
-// what stored information was computed with: only the labels, the tolerances
-// (prior sigmas), the thresholds of tables and triggers, the policy and the use
-// of noise scales can change. An event names the caller.
+// what stored information was computed with: only the labels, the prior (its
+// mean and sigmas), the thresholds of tables and triggers, the policy and the
+// use of noise scales can change. Stored information does not contain the
+// prior; scores depend on its sigmas. An event names the caller and the reason,
+// if there is one.
 absl::StatusOr<RigUpdate> UpdateRig(UnitOfWork* tx,
                                     const RigChange& change,
-                                    const std::string& caller);
+                                    const std::string& caller,
+                                    const std::string& reason);
 
 }  // namespace selfcal::server

@@ -35,7 +35,7 @@ void CheckFit(const CheckContext& context,
 // CandidateValidation::of_active, if `effects` fails.
 std::string EffectOnActive(const CheckContext& context);
 
-// candidate_estimate.cc: the estimate compared with the factory's and the
+// candidate_estimate.cc: the estimate compared with the prior and the
 // active one. prior_sigmas, prior_agreement, rank, sigma_growth.
 void CheckEstimate(const CheckContext& context,
                    std::vector<ValidationCheck>* checks);

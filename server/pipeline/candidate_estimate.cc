@@ -1,4 +1,4 @@
-// The estimate of a candidate compared with the factory's and the active one.
+// The estimate of a candidate compared with the prior and the active one.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,11 +16,16 @@ std::string AndOthers(int count) {
                     : fmt::format(", and {} others", count - 1);
 }
 
+// The centre of the prior, in sentences.
+const char* CentreText(const Rig& rig) {
+  return rig.prior_mean ? "prior mean" : "factory's value";
+}
+
 void CheckValues(const CheckContext& context,
                  std::vector<ValidationCheck>* checks) {
   const Rig& rig = context.rig;
   const double limit = context.limits.max_prior_sigmas;
-  const Eigen::VectorXd change = BoxMinus(context.result.theta, rig.factory);
+  const Eigen::VectorXd change = BoxMinus(context.result.theta, PriorMean(rig));
   const Eigen::VectorXd prior = PriorSigmas(rig);
   double largest = 0;
   int worst = 0;
@@ -36,11 +41,12 @@ void CheckValues(const CheckContext& context,
   std::string failure;
   if (beyond > 0) {
     failure = fmt::format(
-        "{} is {:.1f} prior sigmas from the factory's value{}: at most {:.1f} "
+        "{} is {:.1f} prior sigmas from the {}{}: at most {:.1f} "
         "are plausible. Check the tolerances (prior_sigmas); for a device "
         "that was rebuilt, create a new rig.",
         TangentComponents(rig.factory)[worst].name,
         largest,
+        CentreText(rig),
         AndOthers(beyond),
         limit);
   }
@@ -58,16 +64,18 @@ void CheckPrior(const CheckContext& context,
   if (ratio > limit) {
     failure = fmt::format(
         "The segments contradict the prior: where they show theta, it is "
-        "{:.2g} times as far from the factory's value as the tolerances say "
+        "{:.2g} times as far from the {} as the tolerances say "
         "(probability {:.1g}). If that is so of the rest, errors are {:.2f} "
         "times as large as stated: at most {:.1f} times may become active. "
-        "Check whether the factory calibration is of such a device (selfcal "
-        "cohort show), widen the tolerances (prior_sigmas, selfcal rig "
+        "Check whether the {} is of such a device (selfcal cohort show), "
+        "widen the tolerances (prior_sigmas, selfcal rig "
         "update), or send richer motion.",
         prior.prior_error_ratio,
+        CentreText(context.rig),
         prior.probability,
         ratio,
-        limit);
+        limit,
+        context.rig.prior_mean ? "prior mean" : "factory calibration");
   }
   AddResult("prior_agreement", ratio, limit, failure, checks);
 }

@@ -63,7 +63,7 @@ struct CandidateLimits {
   // accelerometers whose axes lie apart (docs/evaluation.md).
   double max_bias_sigmas = 2;
   double doubtful_bias_sigmas = 1;
-  // A component may lie this many prior sigmas from the factory's value.
+  // A component may lie this many prior sigmas from the mean of the prior.
   // Chosen, not measured.
   double max_prior_sigmas = 10;
   // The sigma of a component that the active version observes may grow by at
@@ -140,7 +140,7 @@ struct CandidateValidation {
 //   that bias a calibration;
 // - effects: no effect that the rig does not estimate shifts a component by
 //   much more than its uncertainty;
-// - prior_sigmas: no free component is further from the factory's value than
+// - prior_sigmas: no free component is further from the mean of the prior than
 //   the tolerances allow;
 // - prior_agreement: the data does not contradict the prior, or determines
 //   everything so well that this does not matter. Only of a candidate that

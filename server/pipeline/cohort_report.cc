@@ -64,7 +64,7 @@ class Reader {
     const Rig& rig = stored.rig;
     if (report_->rigs++ == 0) {
       report_->reference = stored;
-      reference_ = rig.factory;
+      reference_ = PriorMean(rig);
       scale_ = PriorSigmas(rig);
     }
     SELFCAL_ASSIGN_OR_RETURN(Measured measured,

@@ -36,7 +36,7 @@ struct CohortReport {
     std::int64_t version = 0;
   };
 
-  StoredRig reference;  // whose factory calibration is cohort.reference
+  StoredRig reference;  // whose prior mean is cohort.reference
   int rigs = 0;         // looked at
   int calibrated = 0;
   bool truncated = false;  // there are more

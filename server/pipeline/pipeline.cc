@@ -244,9 +244,10 @@ class PipelineImpl : public Pipeline {
 
   absl::StatusOr<StoredRig> UpdateRig(const std::string& rig,
                                       const RigChange& change,
-                                      const std::string& caller) override {
+                                      const std::string& caller,
+                                      const std::string& reason) override {
     SELFCAL_ASSIGN_OR_RETURN(RigUpdate update,
-                             domain_->UpdateRig(rig, change, caller));
+                             domain_->UpdateRig(rig, change, caller, reason));
     spdlog::info("{} has changed rig {}", caller, rig);
     if (update.rescore) {
       SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,

@@ -189,11 +189,12 @@ class Pipeline {
   // does not wait.
   virtual void EndSession(const std::string& rig) = 0;
 
-  // Domain::UpdateRig; rescores the stored segments if the prior has
-  // changed.
+  // Domain::UpdateRig; rescores the stored segments if the sigmas of the prior
+  // have changed.
   virtual absl::StatusOr<StoredRig> UpdateRig(const std::string& rig,
                                               const RigChange& change,
-                                              const std::string& caller) = 0;
+                                              const std::string& caller,
+                                              const std::string& reason) = 0;
   // Domain::DeleteRig, once no segment of the rig is being scored.
   virtual absl::Status DeleteRig(const std::string& rig,
                                  const std::string& caller,

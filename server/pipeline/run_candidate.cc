@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/population/prior_start.h"
 #include "server/pipeline/run_options.h"
 #include "server/pipeline/run_settings.h"
 #include "server/status/status_macros.h"
@@ -66,6 +67,18 @@ absl::StatusOr<CalibrationResult> RunSolver(const RunContext& context,
   return result;
 }
 
+// Where a run starts: at the version that it is based on, or, if the prior of
+// the rig has a mean of its own, with that mean where nothing is known. After a
+// device change, the options of the run have what is known.
+Calibration StartOf(const StoredRun& run,
+                    const Rig& rig,
+                    const StoredCalibration& base) {
+  if (!rig.prior_mean || run.change > 0) return base.theta;
+  // The factory calibration is no estimate.
+  if (!base.run) return PriorMean(rig);
+  return StartFromPrior(rig, base.theta, base.covariance);
+}
+
 absl::StatusOr<StoredCalibration> ComputeCandidate(
     const RunContext& context,
     const StoredRun& run,
@@ -82,7 +95,7 @@ absl::StatusOr<StoredCalibration> ComputeCandidate(
                            RunSolver(context,
                                      run,
                                      rig.rig,
-                                     base.theta,
+                                     StartOf(run, rig.rig, base),
                                      SegmentsOf(context, run, damaged),
                                      options));
   StoredCalibration candidate;

@@ -76,8 +76,9 @@ class FakePipeline final : public Pipeline {
 
   absl::StatusOr<StoredRig> UpdateRig(const std::string& rig,
                                       const RigChange& change,
-                                      const std::string& caller) override {
-    auto update = domain_->UpdateRig(rig, change, caller);
+                                      const std::string& caller,
+                                      const std::string& reason) override {
+    auto update = domain_->UpdateRig(rig, change, caller, reason);
     if (!update.ok()) return update.status();
     return std::move(update->rig);
   }

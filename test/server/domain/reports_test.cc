@@ -72,6 +72,38 @@ TEST_P(ReportsTest, WhatChangesLaterFollows) {
   ExpectSame("a");
 }
 
+// With its checksum: both read the same prior.
+TEST_P(ReportsTest, AChangedPriorMeanIsReported) {
+  const Rig rig = CreateDeviceRig("a");
+  ReportAll();
+  Calibration mean = rig.factory;
+  mean.cameras[0].f.x() += 1;
+  const auto updated = device_domain_->UpdateRig(
+      "a",
+      [&](StoredRig stored) -> absl::StatusOr<StoredRig> {
+        stored.rig.prior_mean = mean;
+        return stored;
+      },
+      "eve");
+  ASSERT_TRUE(updated.ok()) << updated.status();
+  ReportAll();
+  ASSERT_TRUE(store_->GetRig("a")->rig.prior_mean.has_value());
+  ExpectSameCalibration(*store_->GetRig("a")->rig.prior_mean, mean);
+  ExpectSame("a");
+}
+
+// A hub fuses information with the prior of the rig.
+TEST_P(ReportsTest, APriorMeanOfAnotherShapeIsRefused) {
+  Rig rig = TestRig("a");
+  rig.prior_mean = rig.factory;
+  rig.prior_mean->cameras.push_back(rig.factory.cameras[0]);
+  ASSERT_TRUE(device_domain_->CreateRig(rig).ok());
+  ReportNewRigs(ReportedData::kNone);
+  const auto answer = Give(NextReport());
+  EXPECT_TRUE(absl::IsInvalidArgument(answer.status())) << answer.status();
+  EXPECT_THAT(std::string(answer.status().message()), HasSubstr("prior_mean"));
+}
+
 TEST_P(ReportsTest, ReportThatComesTwiceChangesNothing) {
   const Rig rig = CreateDeviceRig("a");
   PutOnDevice(rig, 0);

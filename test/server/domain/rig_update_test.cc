@@ -83,6 +83,32 @@ TEST_P(RigUpdateTest, OtherTolerancesCallForNewScores) {
             PriorSigmas(update->rig.rig));
 }
 
+// Scores depend on the sigmas of the prior alone.
+TEST_P(RigUpdateTest, AnotherPriorMeanNeedsNoNewScores) {
+  Calibration mean = rig_.factory;
+  mean.cameras[0].f.x() += 1;
+  const auto update = domain_->UpdateRig(
+      "a",
+      [&](StoredRig rig) -> absl::StatusOr<StoredRig> {
+        rig.rig.prior_mean = mean;
+        return rig;
+      },
+      "eve",
+      "as its cohort");
+  ASSERT_TRUE(update.ok()) << update.status();
+  EXPECT_FALSE(update->rescore);
+  const auto events = store_->ListNewestEvents({1, ""}, "a");
+  EXPECT_EQ(events->items.at(0).kind, EventKind::kRigUpdated);
+  EXPECT_EQ(events->items.at(0).detail, "changed by eve: as its cohort");
+  Reopen();
+  ASSERT_TRUE(store_->GetRig("a")->rig.prior_mean.has_value());
+  ExpectSameCalibration(*store_->GetRig("a")->rig.prior_mean, mean);
+  // Version 1 remains the factory calibration.
+  ExpectSameCalibration(store_->GetActiveCalibration("a")->theta, rig_.factory);
+  ASSERT_TRUE(Update([](StoredRig* rig) { rig->rig.prior_mean.reset(); }).ok());
+  EXPECT_FALSE(store_->GetRig("a")->rig.prior_mean.has_value());
+}
+
 TEST_P(RigUpdateTest, DeviceAndWhatIsComputedWithItStay) {
   const std::vector<std::function<void(StoredRig*)>> changes = {
       [](StoredRig* rig) { rig->rig.factory.imu.s_g.x() += 0.01; },

@@ -246,6 +246,53 @@ TEST_F(RigServiceTest, UpdateChangesWhatTheMaskNamesAndNothingElse) {
   EXPECT_EQ(read.retrigger_fraction(), 0.25);
 }
 
+TEST_F(RigServiceTest, PriorMeanCanChangeInWhatTheRigEstimates) {
+  ASSERT_TRUE(Create(ToProto(TestRig("r"))).ok());
+  v1::UpdateRigRequest request;
+  request.mutable_rig()->set_name("rigs/r");
+  v1::CalibrationParameters* mean = request.mutable_rig()->mutable_prior_mean();
+  *mean = ToProto(TestRig("r").factory);
+  mean->mutable_cameras(0)->mutable_f()->set_x(mean->cameras(0).f().x() + 1);
+  request.mutable_update_mask()->add_paths("prior_mean");
+  request.set_reason("as its cohort");
+  v1::Rig updated;
+  {
+    Context context;
+    const auto status = rigs_->UpdateRig(&context, request, &updated);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+  }
+  v1::Rig read;
+  ASSERT_TRUE(Get("rigs/r", &read).ok());
+  EXPECT_EQ(read.prior_mean().cameras(0).f().x(), mean->cameras(0).f().x());
+  EXPECT_EQ(read.factory().cameras(0).f().x(),
+            TestRig("r").factory.cameras[0].f.x());
+  const auto events = store_->ListNewestEvents({1, ""}, "r");
+  EXPECT_THAT(events->items.at(0).detail, HasSubstr(": as its cohort"));
+  // Its time offset is not estimated.
+  mean->mutable_cameras(0)->set_time_offset_s(1e-3);
+  {
+    Context context;
+    const auto status = rigs_->UpdateRig(&context, request, &updated);
+    EXPECT_THAT(BadFields(status), ElementsAre("rig.prior_mean"));
+    EXPECT_THAT(status.error_message(), HasSubstr("cam0.time_offset"));
+  }
+  mean->clear_cameras();
+  request.set_reason("two\nlines");
+  {
+    Context context;
+    EXPECT_THAT(BadFields(rigs_->UpdateRig(&context, request, &updated)),
+                ElementsAre("reason"));
+  }
+  // Absent: the factory calibration again.
+  request.mutable_rig()->clear_prior_mean();
+  request.clear_reason();
+  {
+    Context context;
+    ASSERT_TRUE(rigs_->UpdateRig(&context, request, &updated).ok());
+  }
+  EXPECT_FALSE(updated.has_prior_mean());
+}
+
 TEST_F(RigServiceTest, UpdateOfWhatCannotChangeSaysWhy) {
   ASSERT_TRUE(Create(ToProto(TestRig("r"))).ok());
   v1::UpdateRigRequest request;

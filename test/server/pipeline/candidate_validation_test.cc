@@ -276,6 +276,28 @@ TEST_F(CandidateTest, DataMustAgreeWithThePriorUnlessItDecidesAlone) {
   EXPECT_EQ(Check("prior_agreement").value, 1);
 }
 
+// A device of another cohort, to which a prior was given: its data shows the
+// factory calibration, three sigmas from the mean.
+TEST_F(CandidateTest, DataMustAgreeWithThePriorMean) {
+  const Eigen::VectorXd prior = PriorSigmas(rig_);
+  Eigen::VectorXd offset = Eigen::VectorXd::Zero(prior.size());
+  Eigen::VectorXd sigmas = Eigen::VectorXd::Zero(prior.size());
+  bool is_shown = false;
+  for (const int k : FreeComponents(rig_)) {
+    is_shown = !is_shown;
+    offset(k) = 3 * prior(k);
+    sigmas(k) = (is_shown ? 0.5 : 1) * prior(k);
+  }
+  result_.theta = rig_.factory;
+  result_.covariance = sigmas.cwiseAbs2().asDiagonal();
+  evidence_.active.covariance = result_.covariance;
+  EXPECT_THAT(Problems(), IsEmpty());
+  rig_.prior_mean = BoxPlus(rig_.factory, offset);
+  EXPECT_THAT(Problem("prior_agreement"),
+              HasSubstr("as far from the prior mean"));
+  EXPECT_NEAR(Check("prior_sigmas").value, 3, 1e-9);
+}
+
 TEST_F(CandidateTest, ValuesMustBeThoseOfACalibration) {
   rig_.prior_sigmas = {{"*", 1e6}};
   result_.theta.cameras[0].f.x() = -5;

@@ -62,6 +62,18 @@ TEST_F(CohortReportTest, LooksAtSoManyRigsOnly) {
   EXPECT_TRUE(all->cohort.devices.empty());
 }
 
+// About which its tolerances hold, the units of the statistics.
+TEST_F(CohortReportTest, OffsetsAreFromThePriorMeanOfTheReference) {
+  Rig rig = TestRig("a");
+  rig.prior_mean = rig.factory;
+  rig.prior_mean->cameras[0].f.x() += kMean_px;
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  const auto report = DescribeCohort(store_.get(), {}, 10);
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->cohort.reference.cameras[0].f.x(),
+            rig.prior_mean->cameras[0].f.x());
+}
+
 TEST_F(CohortReportTest, DevicesWithOtherCamerasDoNotCount) {
   CreateRig("a");
   Rig other = TestRig("b");

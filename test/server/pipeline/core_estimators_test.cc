@@ -223,7 +223,8 @@ TEST_F(CoreEstimatorsTest, AWrongPriorIsRejectedUntilItIsWidened) {
         stored.rig.prior_sigmas = device.prior_sigmas;
         return stored;
       },
-      "eve");
+      "eve",
+      "");
   ASSERT_TRUE(updated.ok()) << updated.status();
   ASSERT_TRUE(AllScored());
   ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());

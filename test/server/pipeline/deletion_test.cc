@@ -155,7 +155,8 @@ TEST_F(DeletionTest, OtherTolerancesScoreWhatIsKeptAnew) {
           change(&after);
           return after;
         },
-        "eve");
+        "eve",
+        "");
   };
   ASSERT_TRUE(update([](StoredRig* rig) { rig->labels["a"] = "b"; }).ok());
   EXPECT_EQ(scored, 2);

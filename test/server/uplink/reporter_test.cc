@@ -1,6 +1,7 @@
 // Rounds of reports, step by step.
 #include "server/uplink/reporter.h"
 
+#include "proto/convert.h"
 #include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/store_service.pb.h"
 #include "server/store/events.h"
@@ -199,6 +200,40 @@ TEST_F(ReporterTest, InstructionsAreCarriedOutAndTheirResultIsTold) {
   const auto events = device_.store->ListNewestEvents({1, ""}, "a");
   ASSERT_TRUE(events.ok()) << events.status();
   EXPECT_THAT(events->items[0].detail, HasSubstr("hub/operator"));
+}
+
+TEST_F(ReporterTest, APriorComesDownToTheDevice) {
+  const Rig rig = CreateDeviceRig();
+  Begin();
+  Report();
+  Calibration mean = rig.factory;
+  mean.cameras[0].f.x() += 1;
+  v1::Instruction instruction;
+  v1::UpdateRigRequest* const update = instruction.mutable_update_rig();
+  update->mutable_rig()->set_name("rigs/a");
+  *update->mutable_rig()->mutable_prior_mean() = ToProto(mean);
+  v1::ComponentSetting* const sigma = update->mutable_rig()->add_prior_sigmas();
+  sigma->set_pattern("cam0.focal.x");
+  sigma->set_value(0.5);
+  update->mutable_update_mask()->add_paths("prior_mean");
+  update->mutable_update_mask()->add_paths("prior_sigmas");
+  update->set_reason("as its cohort");
+  Give(instruction);
+  now_ += std::chrono::minutes(1);
+  Report();
+  Report();
+  EXPECT_EQ(NewestInstruction().state(), v1::Instruction::DONE);
+  for (Store* const store : {device_.store.get(), hub_.store.get()}) {
+    const auto stored = store->GetRig("a");
+    ASSERT_TRUE(stored.ok()) << stored.status();
+    EXPECT_EQ(PriorMean(stored->rig).cameras[0].f.x(), mean.cameras[0].f.x());
+    ASSERT_EQ(stored->rig.prior_sigmas.size(), 1u);
+    EXPECT_EQ(stored->rig.prior_sigmas[0].value, 0.5);
+  }
+  const auto events = device_.store->ListNewestEvents({1, ""}, "a");
+  ASSERT_TRUE(events.ok()) << events.status();
+  EXPECT_THAT(events->items[0].detail,
+              HasSubstr("hub/operator: as its cohort"));
 }
 
 TEST_F(ReporterTest, AnInstructionTheDeviceRefusesIsToldWithTheReason) {
