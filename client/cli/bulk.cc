@@ -7,7 +7,6 @@
 #include "client/cli/confirmation.h"
 #include "client/cli/instruction.h"
 #include "client/text/text.h"
-#include "selfcal/v1/rig.grpc.pb.h"
 
 namespace selfcal::client {
 namespace {
@@ -62,6 +61,17 @@ grpc::Status ReadRigs(const Context& context,
       stub.get(), &RigService::ListRigs, request, &listed);
   if (status.ok()) rigs->assign(listed.rigs().begin(), listed.rigs().end());
   return status;
+}
+
+BulkChange UpdateOf(RigService* stub, const v1::UpdateRigRequest& request) {
+  BulkChange change;
+  change.rig = LastPart(request.rig().name());
+  *change.instruction.mutable_update_rig() = request;
+  change.call = [stub, request] {
+    v1::Rig rig;
+    return Call<RigService>(stub, &RigService::UpdateRig, request, &rig);
+  };
+  return change;
 }
 
 int CarryOut(const Context& context,

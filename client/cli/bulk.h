@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "client/cli/context.h"
-#include "selfcal/v1/rig.pb.h"
+#include "selfcal/v1/rig.grpc.pb.h"
 #include "selfcal/v1/uplink.pb.h"
 
 namespace selfcal::client {
@@ -35,6 +35,10 @@ struct BulkChange {
   // The same call, for the device if it reports the rig.
   v1::Instruction instruction = {};
 };
+
+// UpdateRig, of the rig that the request names; `stub` must outlive the change.
+BulkChange UpdateOf(v1::RigService::StubInterface* stub,
+                    const v1::UpdateRigRequest& request);
 
 // The words of messages about a change: "Roll back 3 rigs at ...?", "tablet is
 // not rolled back: ...".

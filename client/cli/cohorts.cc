@@ -2,11 +2,10 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
-#include <utility>
 
+#include "client/cli/cohort_versions.h"
 #include "client/cli/commands.h"
 #include "client/cli/list_options.h"
 #include "client/text/estimate_text.h"
@@ -93,7 +92,8 @@ int ShowCohort(Context* context, const v1::DescribeCohortRequest& request) {
                         cohort.rigs(),
                         cohort.truncated() ? " (there are more)" : "",
                         cohort.calibrated()));
-  facts.Add("offsets", "from the factory's of " + LastPart(cohort.reference()));
+  facts.Add("offsets",
+            "from the prior mean of " + LastPart(cohort.reference()));
   if (!cohort.estimated()) {
     facts.Add("mean and spread", "too few devices are calibrated");
   }
@@ -117,36 +117,6 @@ struct VersionOptions {
   ListOptions list;
 };
 
-// Puts LABEL=VALUE into the request.
-absl::Status NameCohort(const std::string& cohort,
-                        v1::ListCohortsRequest* request) {
-  const std::size_t sign = cohort.find('=');
-  if (sign == 0 || sign == cohort.npos || sign + 1 == cohort.size()) {
-    return absl::InvalidArgumentError("'" + cohort +
-                                      "' is not a cohort: give LABEL=VALUE, "
-                                      "e.g. model=t4");
-  }
-  request->set_label(cohort.substr(0, sign));
-  request->set_value(cohort.substr(sign + 1));
-  return absl::OkStatus();
-}
-
-grpc::Status CallForCohorts(
-    Context* context,
-    const v1::ListCohortsRequest& request,
-    std::size_t limit,
-    const std::function<bool(const v1::CohortVersion&)>& wanted,
-    v1::ListCohortsResponse* cohorts) {
-  const auto stub = v1::FleetService::NewStub(context->Channel());
-  return CallForItems<FleetService>(stub.get(),
-                                    &FleetService::ListCohorts,
-                                    request,
-                                    &v1::ListCohortsResponse::mutable_cohorts,
-                                    limit,
-                                    wanted,
-                                    cohorts);
-}
-
 int ListCohorts(Context* context, const VersionOptions& options) {
   v1::ListCohortsRequest request;
   if (!options.cohort.empty()) {
@@ -155,7 +125,7 @@ int ListCohorts(Context* context, const VersionOptions& options) {
   }
   v1::ListCohortsResponse cohorts;
   const auto status =
-      CallForCohorts(context, request, options.list.limit, nullptr, &cohorts);
+      CallForCohorts(*context, request, options.list.limit, nullptr, &cohorts);
   if (!status.ok()) return Fail(*context, status);
   if (context->PrintList(cohorts)) return kDone;
   Table table({{"cohort"},
@@ -180,39 +150,14 @@ int ListCohorts(Context* context, const VersionOptions& options) {
 }
 
 int PrintPrior(Context* context, const VersionOptions& options) {
-  v1::ListCohortsRequest request;
-  const absl::Status named = NameCohort(options.cohort, &request);
-  if (!named.ok()) return FailInput(named);
-  v1::ListCohortsResponse cohorts;
-  const auto status = CallForCohorts(
-      context,
-      request,
-      1,
-      [&](const v1::CohortVersion& version) {
-        return options.version == 0 || version.version() == options.version;
-      },
-      &cohorts);
+  absl::StatusOr<v1::CohortVersion> found;
+  const grpc::Status status =
+      ReadCohortPrior(*context, options.cohort, options.version, &found);
   if (!status.ok()) return Fail(*context, status);
-  if (cohorts.cohorts().empty()) {
-    return FailInput(absl::NotFoundError(
-        options.version == 0
-            ? "there are no statistics of the cohort " + options.cohort +
-                  "; 'selfcal cohort list' shows those that there are"
-            : "the cohort has no such version; 'selfcal cohort list " +
-                  options.cohort + "' shows those that it has"));
-  }
-  const v1::Cohort& cohort = cohorts.cohorts(0).cohort();
-  if (!cohort.has_prior()) {
-    return FailInput(absl::FailedPreconditionError(
-        fmt::format("only {} devices of the cohort are calibrated, too few for "
-                    "a prior",
-                    cohort.calibrated())));
-  }
-  v1::Rig rig = cohort.prior();
+  if (!found.ok()) return FailInput(found.status());
+  v1::Rig rig = found->cohort().prior();
   rig.set_name(RigName(options.rig));
-  const auto [label, value] =
-      std::pair(cohorts.cohorts(0).label(), cohorts.cohorts(0).value());
-  (*rig.mutable_labels())[label] = value;
+  (*rig.mutable_labels())[found->label()] = found->value();
   context->PrintJson(rig);
   return kDone;
 }
@@ -282,6 +227,7 @@ void AddCohortCommands(CLI::App* app, Context* context) {
     };
   });
   AddVersionCommands(cohorts, context);
+  AddCohortApply(cohorts, context);
 }
 
 }  // namespace selfcal::client

@@ -59,6 +59,8 @@ void AddCalibrationExport(CLI::App* calibrations, Context* context);
 CLI::App* AddCalibrationReport(CLI::App* parent,
                                const std::string& name,
                                Context* context);
+// A verb of cohort.
+void AddCohortApply(CLI::App* cohorts, Context* context);
 // The verb of event.
 CLI::App* AddEventList(CLI::App* parent,
                        const std::string& name,

@@ -36,7 +36,9 @@ std::string RequestText(const v1::Instruction& instruction) {
                          LastPart(instruction.activate_calibration().name()),
                          instruction.activate_calibration().reason());
     case v1::Instruction::kUpdateRig:
-      return "change the rig";
+      return instruction.update_rig().reason().empty()
+                 ? "change the rig"
+                 : "change the rig: " + instruction.update_rig().reason();
     case v1::Instruction::kStartRecalibration:
       return "recalibrate";
     case v1::Instruction::kQuarantineSegments:

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "client/cli/rig_input.h"
 #include "client/text/text.h"
@@ -120,17 +121,30 @@ Facts Describe(const v1::Rig& rig,
   return facts;
 }
 
-// Returns an empty table if the message is invalid.
+// With the prior mean, if the rig has one. Returns an empty table if the
+// message is invalid.
 Table FactoryValues(const v1::Rig& rig) {
-  Table table({{"factory"}, {"value", true}, {"unit"}});
+  std::vector<Column> columns = {{"factory"}, {"value", true}, {"unit"}};
+  if (rig.has_prior_mean()) columns.push_back({"prior mean", true});
+  Table table(columns);
   Calibration theta;
-  if (!FromProto(rig.factory(), "", &theta).empty()) return table;
+  Calibration mean;
+  if (!FromProto(rig.factory(), "", &theta).empty() ||
+      (rig.has_prior_mean() &&
+       (!FromProto(rig.prior_mean(), "", &mean).empty() ||
+        !SameShape(mean, theta)))) {
+    return table;
+  }
   const auto components = TangentComponents(theta);
   const Eigen::VectorXd values = ReadableValues(theta);
+  const Eigen::VectorXd means =
+      rig.has_prior_mean() ? ReadableValues(mean) : Eigen::VectorXd();
   for (std::size_t i = 0; i < components.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
     table.Add({components[i].name,
-               ValueText(values[static_cast<Eigen::Index>(i)], 0),
-               components[i].unit});
+               ValueText(values[k], 0),
+               components[i].unit,
+               k < means.size() ? ValueText(means[k], 0) : ""});
   }
   return table;
 }

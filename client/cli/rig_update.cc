@@ -32,6 +32,7 @@ struct UpdateOptions {
   BulkOptions bulk;
   std::vector<std::string> labels;  // name=value
   std::vector<std::string> removed_labels;
+  bool clear_prior_mean = false;
   std::vector<std::string> prior_sigmas;    // pattern=value
   std::vector<std::string> walk_densities;  // pattern=value
   std::optional<double> min_gain_nats;
@@ -89,6 +90,7 @@ absl::Status ReadRequest(const UpdateOptions& options,
   auto* mask = request->mutable_update_mask();
   absl::Status status = ReadLabels(options, rig, request);
   if (!status.ok()) return status;
+  if (options.clear_prior_mean) mask->add_paths("prior_mean");
   if (!options.prior_sigmas.empty()) mask->add_paths("prior_sigmas");
   status = ReadComponents("--prior-sigma",
                           options.prior_sigmas,
@@ -224,13 +226,7 @@ std::vector<BulkChange> ChangesOf(RigService* stub,
                                   const std::vector<Plan>& plans) {
   std::vector<BulkChange> changes;
   for (const Plan& plan : plans) {
-    BulkChange& change = changes.emplace_back();
-    change.rig = LastPart(plan.after.name());
-    *change.instruction.mutable_update_rig() = plan.request;
-    change.call = [stub, request = plan.request] {
-      v1::Rig rig;
-      return Call<RigService>(stub, &RigService::UpdateRig, request, &rig);
-    };
+    changes.push_back(UpdateOf(stub, plan.request));
   }
   return changes;
 }
@@ -270,6 +266,9 @@ void AddRigUpdate(CLI::App* rig, Context* context) {
   update->add_option(
       "--label", options->labels, "NAME=VALUE: add or change; repeatable");
   update->add_option("--remove-label", options->removed_labels, "repeatable");
+  update->add_flag("--clear-prior-mean",
+                   options->clear_prior_mean,
+                   "The mean of the prior is the factory calibration again");
   update->add_option("--prior-sigma",
                      options->prior_sigmas,
                      "COMPONENT=VALUE: replaces all prior sigmas; repeatable");

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "selfcal/v1/activity_service.grpc.pb.h"
+#include "selfcal/v1/fleet.grpc.pb.h"
 #include "selfcal/v1/uplink.grpc.pb.h"
 #include "test/client/cli/commands_fixture.h"
 
@@ -16,6 +17,7 @@ const grpc::Status kRefused = {grpc::StatusCode::FAILED_PRECONDITION,
                                "a device reports the rig"};
 
 struct CannedHub final : v1::RigService::Service,
+                         v1::FleetService::Service,
                          v1::SegmentService::Service,
                          v1::CalibrationService::Service,
                          v1::RecalibrationService::Service,
@@ -29,6 +31,29 @@ struct CannedHub final : v1::RigService::Service,
                       const v1::GetRigRequest* request,
                       v1::Rig* response) override {
     response->set_name(request->name());
+    return grpc::Status::OK;
+  }
+  grpc::Status ListRigs(grpc::ServerContext*,
+                        const v1::ListRigsRequest*,
+                        v1::ListRigsResponse* response) override {
+    v1::Rig* rig = response->add_rigs();
+    *rig = ToProto(ARig("tablet"));
+    (*rig->mutable_labels())["model"] = "t4";
+    return grpc::Status::OK;
+  }
+  grpc::Status ListCohorts(grpc::ServerContext*,
+                           const v1::ListCohortsRequest* request,
+                           v1::ListCohortsResponse* response) override {
+    v1::CohortVersion* version = response->add_cohorts();
+    version->set_label(request->label());
+    version->set_value(request->value());
+    version->set_version(1);
+    Rig prior = ARig("prior");
+    prior.factory.cameras[0].f.x() += 3;
+    *version->mutable_cohort()->mutable_prior() = ToProto(prior);
+    v1::CohortComponent* focal = version->mutable_cohort()->add_components();
+    focal->set_component("cam0.focal.x");
+    focal->set_spread_degrees(10);
     return grpc::Status::OK;
   }
   grpc::Status UpdateRig(grpc::ServerContext*,
@@ -73,6 +98,7 @@ struct CannedHub final : v1::RigService::Service,
   }
 
   GrpcServer server{{static_cast<v1::RigService::Service*>(this),
+                     static_cast<v1::FleetService::Service*>(this),
                      static_cast<v1::SegmentService::Service*>(this),
                      static_cast<v1::CalibrationService::Service*>(this),
                      static_cast<v1::RecalibrationService::Service*>(this),
@@ -111,6 +137,16 @@ TEST_F(Instructions, AreGivenByTheCommandsThatChangeARig) {
   EXPECT_EQ(activate.activate_calibration().reason(), "better");
   const auto update = GivenBy({"rig", "update", "tablet", "--label", "a=b"});
   EXPECT_EQ(update.update_rig().rig().labels().at("a"), "b");
+  const auto prior = GivenBy({"cohort",
+                              "apply",
+                              "model=t4",
+                              "--filter",
+                              "labels.model = t4",
+                              "--reason",
+                              "new statistics",
+                              "--yes"});
+  EXPECT_EQ(prior.update_rig().rig().prior_mean().cameras(0).f().x(), 258);
+  EXPECT_EQ(prior.update_rig().reason(), "new statistics");
   const auto quarantine = GivenBy(
       {"segment", "quarantine", "tablet", "walk~7", "--reason", "diverged"});
   EXPECT_EQ(quarantine.quarantine_segments().session(), "walk");

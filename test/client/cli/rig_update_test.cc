@@ -104,6 +104,17 @@ TEST_F(RigUpdate, ChangesNothingIfItCannotBeReadForOneRig) {
   EXPECT_THAT(daemon_.updates, IsEmpty());
 }
 
+TEST_F(RigUpdate, ClearsThePriorMean) {
+  *daemon_.rigs[0].mutable_prior_mean() = daemon_.rigs[0].factory();
+  const Outcome outcome = Update({"--clear-prior-mean", "--yes"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  ASSERT_EQ(daemon_.updates.size(), 1u);  // the other one has none
+  EXPECT_EQ(daemon_.updates[0].rig().name(), "rigs/a");
+  EXPECT_FALSE(daemon_.updates[0].rig().has_prior_mean());
+  EXPECT_THAT(daemon_.updates[0].update_mask().paths(),
+              ElementsAre("prior_mean"));
+}
+
 // A rig is changed at once.
 TEST_F(RigUpdate, HasNoDryRunOfOneRig) {
   const Outcome outcome =
