@@ -195,6 +195,20 @@ TEST_F(Commands, JsonIsTheMessageOfTheContract) {
             daemon_.rigs[0].SerializeAsString());
 }
 
+TEST_F(Commands, RigShowHasThePriorMeanBesideTheFactoryValues) {
+  Rig rig = ARig("device");
+  daemon_.rigs.push_back(ToProto(rig));
+  EXPECT_THAT(Selfcal({"rig", "show", "device"}).out,
+              Not(HasSubstr("px\t258")));
+  rig.prior_mean = rig.factory;
+  rig.prior_mean->cameras[0].f.x() = 258;
+  daemon_.rigs[0] = ToProto(rig);
+  const Outcome outcome = Selfcal({"rig", "show", "device"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("cam0.focal.x\t255"), HasSubstr("px\t258")));
+}
+
 TEST_F(Commands, ARefusalExitsWithOne) {
   const Outcome outcome = Selfcal({"rig", "show", "nobody"});
   EXPECT_EQ(outcome.code, 1);
