@@ -131,6 +131,11 @@ v1::Segment Encode(const StoredSegment& segment) {
   message.set_sequence(segment.sequence);
   message.set_problem(segment.problem);
   if (segment.temperature_c) message.set_temperature_c(*segment.temperature_c);
+  if (segment.motion) {
+    v1::Segment::Motion* motion = message.mutable_motion();
+    motion->set_angular_rate(segment.motion->angular_rate_radps);
+    motion->set_acceleration(segment.motion->acceleration_mps2);
+  }
   if (!segment.information) return message;
   const SegmentInformation& information = *segment.information;
   for (const GroupScore& score : information.groups) {

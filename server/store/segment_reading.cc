@@ -26,10 +26,11 @@ constexpr char kSegmentColumns[] =
     "  (SELECT length(p.data) FROM payloads p "
     "    WHERE p.rig = s.rig AND p.sequence = s.sequence), "
     "  s.temperature_c, s.steady_ns, s.rig, "
-    "  (SELECT g.id FROM rigs g WHERE g.rig = s.rig)";
+    "  (SELECT g.id FROM rigs g WHERE g.rig = s.rig), "
+    "  s.angular_rate, s.acceleration";
 constexpr int kSteadyColumn = 17;
 constexpr int kRigColumn = 18;
-constexpr int kKeyColumn = 20;  // after the columns of a list
+constexpr int kKeyColumn = 22;  // after the columns of a list
 
 StoredSegment MetadataFromRow(const Statement& row) {
   StoredSegment segment;
@@ -49,6 +50,10 @@ StoredSegment MetadataFromRow(const Statement& row) {
   segment.has_data = !row.IsNull(15);
   segment.payload_bytes = row.Int(15);
   if (!row.IsNull(16)) segment.temperature_c = row.Double(16);
+  if (!row.IsNull(20) && !row.IsNull(21)) {
+    segment.motion = {.angular_rate_radps = row.Double(20),
+                      .acceleration_mps2 = row.Double(21)};
+  }
   return segment;
 }
 

@@ -68,6 +68,7 @@ absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment) {
   packed.landmarks = static_cast<std::int64_t>(segment.landmarks.size());
   packed.observations = static_cast<std::int64_t>(segment.observations.size());
   packed.temperature_c = segment.temperature_c;
+  packed.motion = MotionStatisticsOf(segment);
   packed.path = PathOf(segment);
   SELFCAL_ASSIGN_OR_RETURN(packed.payload, PackSegment(segment));
   return packed;
@@ -188,10 +189,11 @@ absl::StatusOr<std::int64_t> InsertSegment(UnitOfWork* tx,
           "INSERT INTO segments (rig, session, session_index, sequence, "
           "  state, receive_time_ns, calibration_version, start_ns, end_ns, "
           "  keyframes, imu_samples, landmarks, observations, "
-          "  temperature_c, steady_ns) "
+          "  temperature_c, angular_rate, acceleration, steady_ns) "
           "VALUES (?1, ?2, ?3, (SELECT coalesce(max(sequence), 0) + 1 "
           "    FROM segments WHERE rig = ?1), "
-          "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) "
+          "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, "
+          "  ?15) "
           "RETURNING sequence",
           tx->rig_row(),
           segment.key.session,
@@ -205,6 +207,8 @@ absl::StatusOr<std::int64_t> InsertSegment(UnitOfWork* tx,
           segment.landmarks,
           segment.observations,
           segment.temperature_c,
+          segment.motion.angular_rate_radps,
+          segment.motion.acceleration_mps2,
           tx->now().steady_ns));
   SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
                                     "UPDATE rigs SET last_seen_ns = ?2 "

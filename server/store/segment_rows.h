@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/motion_statistics.h"
 #include "server/store/exclusions.h"
 #include "server/store/payload.h"
 #include "server/store/store.h"
@@ -47,6 +48,7 @@ struct NewSegment {
   std::int64_t landmarks = 0;
   std::int64_t observations = 0;
   std::optional<double> temperature_c;
+  MotionStatistics motion;
   std::vector<PathPoint> path;
   Payload payload;
 };

@@ -33,6 +33,7 @@
 #include "core/change/detect_change.h"
 #include "core/information/segment_ends.h"
 #include "core/information/segment_information.h"
+#include "core/model/motion_statistics.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
 #include "core/selection/tables.h"
@@ -95,7 +96,9 @@ struct StoredSegment {
   int imu_samples = 0;
   int landmarks = 0;
   int observations = 0;
-  std::optional<double> temperature_c;            // of the device
+  std::optional<double> temperature_c;  // of the device
+  // Of segments that were received since it is computed.
+  std::optional<MotionStatistics> motion;
   std::optional<SegmentInformation> information;  // if scored
   std::vector<std::string> tables;                // groups that hold it
   // Why it is unusable or its data is gone. Empty if neither holds, or if the

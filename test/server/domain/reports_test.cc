@@ -49,6 +49,52 @@ TEST_P(ReportsTest, HubHasWhatTheDeviceHas) {
   EXPECT_FALSE(HasData("a", 4));
 }
 
+TEST_P(ReportsTest, MotionAtTheHubIsThatOfTheDevice) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  ReportAll();
+  const auto device = device_->GetSegment("a", {"s", 0});
+  ASSERT_TRUE(device.ok()) << device.status();
+  ASSERT_TRUE(device->motion.has_value());
+  const auto hub = store_->GetSegment("a", {"s", 0});
+  ASSERT_TRUE(hub.ok()) << hub.status();
+  EXPECT_EQ(hub->motion, device->motion);
+}
+
+// Its tables end before the columns with the motion.
+TEST_P(ReportsTest, DeviceThatDoesNotKnowMotionIsTaken) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  ReportNewRigs(ReportedData::kNone);
+  Report report = NextReport();
+  store::ReportedRecords records;
+  ASSERT_TRUE(records.ParseFromString(report.records));
+  int index = 0;
+  int removed = 0;
+  for (auto& table : *records.mutable_tables()) {
+    const int of = index++;
+    if (table.name() != "segments") continue;
+    ASSERT_EQ(table.columns(table.columns_size() - 2), "angular_rate");
+    ASSERT_EQ(table.columns(table.columns_size() - 1), "acceleration");
+    for (int k = 0; k < 2; ++k) table.mutable_columns()->RemoveLast();
+    for (auto& record : *records.mutable_records()) {
+      for (auto& row : *record.mutable_rows()) {
+        if (row.table() != of) continue;
+        for (int k = 0; k < 2; ++k) row.mutable_values()->RemoveLast();
+        ++removed;
+      }
+    }
+  }
+  ASSERT_EQ(removed, 1);
+  report.records = records.SerializeAsString();
+  const auto answer = Give(report);
+  ASSERT_TRUE(answer.ok()) << answer.status();
+  const auto hub = store_->GetSegment("a", {"s", 0});
+  ASSERT_TRUE(hub.ok()) << hub.status();
+  EXPECT_EQ(hub->motion, std::nullopt);
+  EXPECT_EQ(hub->keyframes, device_->GetSegment("a", {"s", 0})->keyframes);
+}
+
 TEST_P(ReportsTest, WhatChangesLaterFollows) {
   const Rig rig = CreateDeviceRig("a");
   ReportAll();

@@ -179,6 +179,25 @@ TEST_F(SegmentStreamTest, TemperatureIsStoredAndShownIfItIsPossible) {
   EXPECT_EQ(listed.segments(1).temperature_c(), 41.5);
 }
 
+TEST_F(SegmentStreamTest, MotionIsShown) {
+  const auto segments = TestSegments(AddRig(), 1);
+  Stream stream(segments_.get());
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::STORED);
+  EXPECT_TRUE(stream.Finish().ok());
+
+  Context context;
+  v1::ListSegmentsRequest request;
+  request.set_parent("rigs/r");
+  v1::ListSegmentsResponse listed;
+  ASSERT_TRUE(segments_->ListSegments(&context, request, &listed).ok());
+  ASSERT_EQ(listed.segments_size(), 1);
+  ASSERT_TRUE(listed.segments(0).has_motion());
+  const MotionStatistics expected = MotionStatisticsOf(segments[0]);
+  const v1::Segment::Motion& motion = listed.segments(0).motion();
+  EXPECT_EQ(motion.angular_rate(), expected.angular_rate_radps);
+  EXPECT_EQ(motion.acceleration(), expected.acceleration_mps2);
+}
+
 TEST_F(SegmentStreamTest, WrongShapeIsRejectedAndTheStreamGoesOn) {
   const auto segments = TestSegments(AddRig(), 1);
   Stream stream(segments_.get());

@@ -75,6 +75,21 @@ TEST_P(SegmentsTest, TemperatureIsKeptWhereItIsKnown) {
   EXPECT_EQ(listed->items[1].temperature_c, -7.25);
 }
 
+TEST_P(SegmentsTest, MotionIsKeptWhenTheDataIsGone) {
+  const Rig rig = CreateTestRig("a");
+  const MotionStatistics expected = MotionStatisticsOf(Segment(0));
+  ASSERT_GT(expected.angular_rate_radps, 0);
+  ASSERT_GT(expected.acceleration_mps2, 0);
+  Put("a", 0);
+  EXPECT_EQ(store_->GetSegment("a", {"s", 0})->motion, expected);
+  Score(rig, 0, 1.0, 0.0);
+  RenewReserve(rig);
+  Reopen();
+  EXPECT_FALSE(HasData("a", 0));
+  EXPECT_EQ(store_->GetSegment("a", {"s", 0})->motion, expected);
+  EXPECT_EQ(store_->ListSegments("a", {})->items.back().motion, expected);
+}
+
 TEST_P(SegmentsTest, SameSegmentTwiceChangesNothing) {
   const Rig rig = CreateTestRig("a");
   Put("a", 0);

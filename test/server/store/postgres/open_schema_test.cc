@@ -114,6 +114,54 @@ TEST_F(OpenSchemaTest, RigsKnowTheEventsOfEarlierRigs) {
   EXPECT_EQ(earlier("c"), 1);
 }
 
+// Version 11 finds exclusions for rare causes by the time at which the segment
+// arrived: of those from before it, and of those that an earlier program writes
+// afterwards.
+TEST_F(OpenSchemaTest, RareExclusionsKnowWhenTheirSegmentsArrived) {
+  const auto all = PostgresMigrations();
+  const std::vector<Migration> before(all.begin(), all.begin() + 10);
+  ASSERT_TRUE(OpenWith(before).ok());
+  const auto write = [&](int sequence, int cause) {
+    return db_->Execute(
+        "INSERT INTO table_absences (rig, sequence, group_name, cause, "
+        "  time_ns) VALUES (1, " +
+        std::to_string(sequence) + ", 'imu', " + std::to_string(cause) +
+        ", 0) ON CONFLICT (rig, sequence, group_name) DO UPDATE SET "
+        "  cause = excluded.cause");
+  };
+  ASSERT_TRUE(db_->Execute("INSERT INTO rigs (rig, id, create_time_ns, "
+                           "  definition, sha256) VALUES (1, 'a', 0, '', '')")
+                  .ok());
+  ASSERT_TRUE(
+      db_->Execute("INSERT INTO segments (rig, session, session_index, "
+                   "  sequence, state, receive_time_ns, calibration_version, "
+                   "  start_ns, end_ns, keyframes, imu_samples, landmarks, "
+                   "  observations, steady_ns) "
+                   "SELECT 1, 's', k, k, 2, 5, 1, 0, 1, 1, 1, 1, 1, 100 + k "
+                   "FROM generate_series(1, 3) k")
+          .ok());
+  ASSERT_TRUE(write(1, 3).ok());
+  ASSERT_TRUE(write(2, 4).ok());
+  ASSERT_TRUE(OpenWith({all.begin(), all.end()}).ok());
+  const auto found = [&](int sequence) {
+    return Number(
+        "SELECT coalesce(max(steady_ns), 0) FROM table_absences "
+        "WHERE sequence = " +
+        std::to_string(sequence));
+  };
+  EXPECT_EQ(found(1), 0);
+  EXPECT_EQ(found(2), 102);
+  EXPECT_EQ(Number("SELECT count(*) FROM segments WHERE angular_rate IS NOT "
+                   "NULL OR acceleration IS NOT NULL"),
+            0);
+  ASSERT_TRUE(write(1, 8).ok());
+  ASSERT_TRUE(write(2, 2).ok());
+  ASSERT_TRUE(write(3, 9).ok());
+  EXPECT_EQ(found(1), 101);
+  EXPECT_EQ(found(2), 0);
+  EXPECT_EQ(found(3), 103);
+}
+
 TEST_F(OpenSchemaTest, AFailedMigrationChangesNothing) {
   ASSERT_TRUE(OpenWith({kFirst, kSecond}).ok());
   const absl::Status status = OpenWith({kFirst, kSecond, kBroken});

@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 23u);
+  ASSERT_EQ(migrations.size(), 24u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -140,6 +140,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[22].name, "0023_ended_reports.sql");
   EXPECT_EQ(migrations[22].sha256,
             "e277f3ecb3eb56c4b305b87fe2dbc0e56350bbb9a92936c1e389e68c8b50a479");
+  EXPECT_EQ(migrations[23].name, "0024_segments_over_rigs.sql");
+  EXPECT_EQ(migrations[23].sha256,
+            "c8e0e34d3debc3190e74daceda7847e2ba51b9ea1e7bbac8ba88f1414b3ea858");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
@@ -273,6 +276,56 @@ TEST_F(OpenDatabaseTest, NumbersOfAllRigsBecomeNumbersOfEachInTheirOrder) {
         "  FROM (SELECT * FROM events ORDER BY steady_ns)"}) {
     EXPECT_EQ(ReadNumber(db->get(), sql), 1) << sql;
   }
+}
+
+// Segments with an exclusion each, of which those for rare causes are found by
+// the time at which the segment arrived.
+constexpr char kExclusions[] =
+    "INSERT INTO rigs (rig, id, create_time_ns, definition, sha256) VALUES "
+    "  (1, 'a', 0, x'00', x'00');"
+    "INSERT INTO segments (rig, session, session_index, sequence, state, "
+    "  receive_time_ns, calibration_version, start_ns, end_ns, keyframes, "
+    "  imu_samples, landmarks, observations, steady_ns) VALUES "
+    "  (1, 's', 0, 1, 2, 5, 1, 0, 1, 1, 1, 1, 1, 70),"
+    "  (1, 's', 1, 2, 2, 5, 1, 0, 1, 1, 1, 1, 1, 80),"
+    "  (1, 's', 2, 3, 2, 5, 1, 0, 1, 1, 1, 1, 1, 90);"
+    "INSERT INTO table_absences (rig, sequence, group_name, cause, time_ns) "
+    "  VALUES (1, 1, 'imu', 3, 0), (1, 2, 'imu', 4, 0), (1, 3, 'imu', 9, 0);";
+
+TEST_F(OpenDatabaseTest, RareExclusionsKnowWhenTheirSegmentsArrived) {
+  const auto all = SqliteMigrations();
+  {
+    auto db = Open({all.begin(), all.begin() + 23});
+    ASSERT_TRUE(db.ok()) << db.status();
+    const absl::Status written = (*db)->Execute(kExclusions);
+    ASSERT_TRUE(written.ok()) << written;
+  }
+  auto db = Open({all.begin(), all.end()});
+  ASSERT_TRUE(db.ok()) << db.status();
+  const auto holds = [&](const std::string& expected) {
+    return ReadNumber(
+        db->get(),
+        "SELECT group_concat(sequence || ':' || coalesce(steady_ns, '-')) = '" +
+            expected +
+            "' FROM (SELECT * FROM table_absences ORDER BY sequence)");
+  };
+  EXPECT_EQ(holds("1:-,2:80,3:90"), 1);
+  EXPECT_EQ(ReadNumber(db->get(),
+                       "SELECT count(*) FROM segments WHERE angular_rate IS "
+                       "NOT NULL OR acceleration IS NOT NULL"),
+            0);
+  // Whatever becomes of them.
+  ASSERT_TRUE((*db)
+                  ->Execute("UPDATE table_absences SET cause = 8 "
+                            "WHERE sequence = 1;"
+                            "UPDATE table_absences SET cause = 2 "
+                            "WHERE sequence = 2;"
+                            "DELETE FROM table_absences WHERE sequence = 3;"
+                            "INSERT INTO table_absences (rig, sequence, "
+                            "  group_name, cause, time_ns) "
+                            "VALUES (1, 3, 'imu', 5, 0);")
+                  .ok());
+  EXPECT_EQ(holds("1:70,2:-,3:90"), 1);
 }
 
 TEST_F(OpenDatabaseTest, FailedMigrationChangesNothing) {
