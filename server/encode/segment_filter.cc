@@ -1,6 +1,7 @@
 #include "server/encode/segment_filter.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
@@ -9,8 +10,10 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "proto/safe_text.h"
+#include "selfcal/v1/segment.pb.h"
 #include "server/encode/filter_terms.h"
 #include "server/status/status_macros.h"
 #include "server/store/store.h"
@@ -109,6 +112,24 @@ absl::Status ReadBool(const FilterTerm& term, std::optional<bool>* value) {
   return absl::OkStatus();
 }
 
+absl::Status ReadCause(const FilterTerm& term,
+                       std::optional<ExclusionCause>* cause) {
+  using v1::TableExclusion;
+  constexpr int kFirst = TableExclusion::CAUSE_UNSPECIFIED + 1;
+  TableExclusion::Cause read = TableExclusion::CAUSE_UNSPECIFIED;
+  if (!TableExclusion::Cause_Parse(term.value, &read) || read < kFirst) {
+    std::vector<std::string> names;
+    for (int k = kFirst; k < TableExclusion::Cause_ARRAYSIZE; ++k) {
+      names.push_back(TableExclusion::Cause_Name(k));
+    }
+    return NotWhatIsExpected(
+        term.value, fmt::format("a cause: {}", fmt::join(names, ", ")));
+  }
+  // The numbers of the contract are those of the store.
+  *cause = static_cast<ExclusionCause>(read);
+  return absl::OkStatus();
+}
+
 // Applies a condition on a field that supports only '='.
 absl::Status ApplyEquality(const FilterTerm& term, SegmentQuery* query) {
   if (term.sign != "=") {
@@ -117,6 +138,7 @@ absl::Status ApplyEquality(const FilterTerm& term, SegmentQuery* query) {
   }
   if (term.field == "state") return ReadState(term, &query->state);
   if (term.field == "has_data") return ReadBool(term, &query->has_data);
+  if (term.field == "excluded") return ReadCause(term, &query->excluded);
   if (term.field == "session") {
     query->session = term.value;
   } else {
@@ -131,7 +153,7 @@ absl::Status Apply(const FilterTerm& term, SegmentQuery* query) {
   }
   if (term.group.empty()) {
     for (const char* const field :
-         {"state", "session", "has_data", "in_table"}) {
+         {"state", "session", "has_data", "in_table", "excluded"}) {
       if (term.field == field) return ApplyEquality(term, query);
     }
     if (term.field == "receive_time") {
@@ -149,12 +171,18 @@ absl::Status Apply(const FilterTerm& term, SegmentQuery* query) {
     if (term.field == "temperature_c") {
       return NarrowByNumber(term, &query->temperature_c);
     }
+    if (term.field == "angular_rate") {
+      return NarrowByNumber(term, &query->angular_rate_radps);
+    }
+    if (term.field == "acceleration") {
+      return NarrowByNumber(term, &query->acceleration_mps2);
+    }
   }
   return NotWhatIsExpected(
       term.field,
-      "a field: state, session, has_data, in_table, receive_time, "
+      "a field: state, session, has_data, in_table, excluded, receive_time, "
       "calibration_version, landmarks, observations, temperature_c, "
-      "entropy.GROUP or gain.GROUP");
+      "angular_rate, acceleration, entropy.GROUP or gain.GROUP");
 }
 
 }  // namespace
@@ -180,6 +208,10 @@ absl::Status ParseSegmentOrder(std::string_view order_by, SegmentQuery* query) {
     query->order = Order::kObservations;
   } else if (field == "temperature_c") {
     query->order = Order::kTemperature;
+  } else if (field == "angular_rate") {
+    query->order = Order::kAngularRate;
+  } else if (field == "acceleration") {
+    query->order = Order::kAcceleration;
   } else if (field.starts_with("entropy.")) {
     query->order = Order::kEntropy;
   } else if (field.starts_with("gain.")) {
@@ -188,7 +220,8 @@ absl::Status ParseSegmentOrder(std::string_view order_by, SegmentQuery* query) {
     return NotWhatIsExpected(
         field,
         "a field to sort by: receive_time, landmarks, observations, "
-        "temperature_c, entropy.GROUP or gain.GROUP");
+        "temperature_c, angular_rate, acceleration, entropy.GROUP or "
+        "gain.GROUP");
   }
   const auto dot = field.find('.');
   if (dot != std::string::npos) query->order_group = field.substr(dot + 1);

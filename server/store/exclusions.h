@@ -1,5 +1,5 @@
 // Records of exclusions: why a table does not hold a scored segment. Exclusion
-// and its causes are in session.h.
+// is in session.h.
 #pragma once
 
 #include <absl/status/status.h>
@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/store/exclusion_cause.h"
 #include "server/store/session.h"
 #include "server/store/unit_of_work.h"
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/status/status_macros.h"
+#include "server/store/exclusions.h"
 #include "server/store/paging.h"
 #include "server/store/rig_lists.h"
 
@@ -24,12 +25,48 @@ void AndRange(const std::string& column,
   if (range.most) to->And(column + " <= " + to->Parameter(*range.most));
 }
 
-void AndScores(const SegmentQuery& query, SqlCondition* to) {
-  if (query.scored_group.empty()) return;
+void AndProperties(const SegmentProperties& filter, SqlCondition* to) {
+  // A literal, as the condition of a partial index has one.
+  if (filter.state) {
+    to->And(fmt::format("s.state = {}", static_cast<int>(*filter.state)));
+  }
+  if (filter.session) {
+    to->And("s.session = " + to->Parameter(*filter.session));
+  }
+  if (filter.has_data) {
+    to->And(
+        fmt::format("{} (SELECT 1 FROM payloads p WHERE p.rig = s.rig "
+                    "  AND p.sequence = s.sequence)",
+                    *filter.has_data ? "EXISTS" : "NOT EXISTS"));
+  }
+  if (filter.in_table) {
+    to->And(
+        "EXISTS (SELECT 1 FROM table_entries e WHERE e.rig = s.rig "
+        "  AND e.sequence = s.sequence AND e.group_name = " +
+        to->Parameter(*filter.in_table) + ")");
+  }
+  if (filter.excluded) {
+    to->And(
+        ExcludedFor(to->Parameter(ExclusionCauses{*filter.excluded}.bits())));
+  }
+}
+
+void AndRanges(const SegmentRanges& filter, SqlCondition* to) {
+  AndRange("s.receive_time_ns", filter.receive_time_ns, to);
+  AndRange("s.calibration_version", filter.calibration_version, to);
+  AndRange("s.landmarks", filter.landmarks, to);
+  AndRange("s.observations", filter.observations, to);
+  AndRange("s.temperature_c", filter.temperature_c, to);
+  AndRange("s.angular_rate", filter.angular_rate_radps, to);
+  AndRange("s.acceleration", filter.acceleration_mps2, to);
+}
+
+void AndScores(const ScoreRanges& filter, SqlCondition* to) {
+  if (filter.scored_group.empty()) return;
   SqlCondition scores = to->Next();
-  scores.And("c.group_name = " + scores.Parameter(query.scored_group));
-  AndRange("c.entropy", query.entropy_nats, &scores);
-  AndRange("c.gain", query.gain_nats, &scores);
+  scores.And("c.group_name = " + scores.Parameter(filter.scored_group));
+  AndRange("c.entropy", filter.entropy_nats, &scores);
+  AndRange("c.gain", filter.gain_nats, &scores);
   to->AndWithin(
       "EXISTS (SELECT 1 FROM segment_scores c WHERE c.rig = s.rig "
       "  AND c.sequence = s.sequence AND ",
@@ -37,39 +74,7 @@ void AndScores(const SegmentQuery& query, SqlCondition* to) {
       ")");
 }
 
-void AndFilter(const SegmentQuery& query, SqlCondition* to) {
-  if (query.state) {
-    to->And("s.state = " +
-            to->Parameter(std::int64_t{static_cast<int>(*query.state)}));
-  }
-  if (query.session) {
-    to->And("s.session = " + to->Parameter(*query.session));
-  }
-  if (query.has_data) {
-    to->And(
-        fmt::format("{} (SELECT 1 FROM payloads p WHERE p.rig = s.rig "
-                    "  AND p.sequence = s.sequence)",
-                    *query.has_data ? "EXISTS" : "NOT EXISTS"));
-  }
-  if (query.in_table) {
-    to->And(
-        "EXISTS (SELECT 1 FROM table_entries e WHERE e.rig = s.rig "
-        "  AND e.sequence = s.sequence AND e.group_name = " +
-        to->Parameter(*query.in_table) + ")");
-  }
-  AndRange("s.receive_time_ns", query.receive_time_ns, to);
-  AndRange("s.calibration_version", query.calibration_version, to);
-  AndRange("s.landmarks", query.landmarks, to);
-  AndRange("s.observations", query.observations, to);
-  AndRange("s.temperature_c", query.temperature_c, to);
-  AndScores(query, to);
-}
-
-bool IsOfGroup(SegmentQuery::Order order) {
-  return order == SegmentQuery::Order::kEntropy ||
-         order == SegmentQuery::Order::kGain;
-}
-
+// The column of the quantity that a list is sorted by.
 std::string_view KeyColumn(SegmentQuery::Order order) {
   switch (order) {
     case SegmentQuery::Order::kArrival:
@@ -80,6 +85,10 @@ std::string_view KeyColumn(SegmentQuery::Order order) {
       return "s.observations";
     case SegmentQuery::Order::kTemperature:
       return "s.temperature_c";
+    case SegmentQuery::Order::kAngularRate:
+      return "s.angular_rate";
+    case SegmentQuery::Order::kAcceleration:
+      return "s.acceleration";
     case SegmentQuery::Order::kEntropy:
       return "o.entropy";
     case SegmentQuery::Order::kGain:
@@ -88,14 +97,86 @@ std::string_view KeyColumn(SegmentQuery::Order order) {
   return "s.sequence";
 }
 
+// True if the exclusions for the cause have an index by time: it is rare.
+bool HasIndex(ExclusionCause cause) { return cause >= ExclusionCause::kTooOld; }
+
+// The table that is read in the order of a list, by an index.
+enum class Source { kSegments, kScores, kExclusions };
+
+Source SourceOf(const SegmentQuery& query, bool of_all) {
+  switch (query.order) {
+    case SegmentQuery::Order::kEntropy:
+    case SegmentQuery::Order::kGain:
+      return Source::kScores;
+    case SegmentQuery::Order::kArrival:
+      return of_all && query.excluded && HasIndex(*query.excluded)
+                 ? Source::kExclusions
+                 : Source::kSegments;
+    default:
+      return Source::kSegments;
+  }
+}
+
+const char* NameOf(Source source) {
+  switch (source) {
+    case Source::kSegments:
+      return "s";
+    case Source::kScores:
+      return "o";
+    case Source::kExclusions:
+      return "a";
+  }
+  return "s";
+}
+
+// The source, with the segments under the name s.
+const char* TablesOf(Source source) {
+  switch (source) {
+    case Source::kSegments:
+      return "segments s";
+    case Source::kScores:
+      return "segments s JOIN segment_scores o "
+             "ON o.rig = s.rig AND o.sequence = s.sequence";
+    case Source::kExclusions:
+      return "table_absences a JOIN segments s "
+             "ON s.rig = a.rig AND s.sequence = a.sequence";
+  }
+  return "segments s";
+}
+
+// The rows of the source that belong to the list. A partial index is used only
+// if its condition is repeated.
+void AndSource(const SegmentQuery& query, Source source, SqlCondition* to) {
+  switch (source) {
+    case Source::kSegments:
+      break;
+    case Source::kScores:
+      return to->And("o.group_name = " + to->Parameter(query.order_group));
+    case Source::kExclusions:
+      to->And("a.cause = " +
+              to->Parameter(std::int64_t{static_cast<int>(*query.excluded)}));
+      return to->And("a.steady_ns IS NOT NULL");
+  }
+  switch (query.order) {
+    case SegmentQuery::Order::kTemperature:
+    case SegmentQuery::Order::kAngularRate:
+    case SegmentQuery::Order::kAcceleration:
+      return to->And(fmt::format("{} IS NOT NULL", KeyColumn(query.order)));
+    default:
+      return;
+  }
+}
+
 // The columns that a list is sorted by; the first is the key. The index of the
 // order has them all.
-std::vector<std::string> OrderColumns(const SegmentQuery& query, bool of_all) {
+std::vector<std::string> OrderColumns(const SegmentQuery& query,
+                                      Source source,
+                                      bool of_all) {
   const bool by_arrival = query.order == SegmentQuery::Order::kArrival;
-  const char* const table = IsOfGroup(query.order) ? "o" : "s";
+  const char* const table = NameOf(source);
   std::vector<std::string> columns;
   if (by_arrival && of_all) {
-    columns.push_back("s.steady_ns");
+    columns.push_back(fmt::format("{}.steady_ns", table));
   } else if (!by_arrival) {
     columns.emplace_back(KeyColumn(query.order));
   }
@@ -123,9 +204,15 @@ std::vector<std::string> OrderValues(const SegmentQuery& query,
   return values;
 }
 
-std::optional<int> StateNumber(const std::optional<SegmentState>& state) {
-  if (!state) return std::nullopt;
-  return static_cast<int>(*state);
+// 0 for none.
+template <typename Enum>
+int NumberOf(const std::optional<Enum>& value) {
+  return value ? static_cast<int>(*value) : 0;
+}
+
+// With its length, so that no text can look like that of another part.
+std::string PartText(const std::optional<std::string>& value) {
+  return value ? fmt::format("={}:{}", value->size(), *value) : "";
 }
 
 template <typename T>
@@ -133,6 +220,40 @@ std::string RangeText(const Range<T>& range) {
   return fmt::format("{}..{}",
                      range.least ? fmt::format("{}", *range.least) : "",
                      range.most ? fmt::format("{}", *range.most) : "");
+}
+
+std::string TextOf(const SegmentProperties& filter) {
+  return fmt::format("{}/{}/{}/{}/{}",
+                     NumberOf(filter.state),
+                     PartText(filter.session),
+                     filter.has_data ? (*filter.has_data ? "yes" : "no") : "",
+                     PartText(filter.in_table),
+                     NumberOf(filter.excluded));
+}
+
+std::string TextOf(const SegmentRanges& filter) {
+  return fmt::format("{}/{}/{}/{}/{}/{}/{}",
+                     RangeText(filter.receive_time_ns),
+                     RangeText(filter.calibration_version),
+                     RangeText(filter.landmarks),
+                     RangeText(filter.observations),
+                     RangeText(filter.temperature_c),
+                     RangeText(filter.angular_rate_radps),
+                     RangeText(filter.acceleration_mps2));
+}
+
+std::string TextOf(const ScoreRanges& filter) {
+  return fmt::format("{}/{}/{}",
+                     PartText(filter.scored_group),
+                     RangeText(filter.entropy_nats),
+                     RangeText(filter.gain_nats));
+}
+
+std::string TextOf(const SegmentOrder& order) {
+  return fmt::format("{}/{}/{}",
+                     static_cast<int>(order.order),
+                     PartText(order.order_group),
+                     order.descending);
 }
 
 }  // namespace
@@ -143,38 +264,32 @@ std::string ListName(const std::string& rig,
   std::string name = "segments/" + rig;
   if (rig.empty()) name += FilterText(rigs);
   if (query == SegmentQuery()) return name;
-  const auto text = [](const std::optional<std::string>& value) {
-    return value ? fmt::format("={}:{}", value->size(), *value) : "";
-  };
-  return fmt::format("{}?{}/{}/{}/{}/{}/{}/{}/{}/{}/{}:{}/{}/{}/{}/{}:{}/{}",
+  const SegmentProperties& properties = query;
+  const SegmentRanges& ranges = query;
+  const ScoreRanges& scores = query;
+  const SegmentOrder& order = query;
+  return fmt::format("{}?{}/{}/{}/{}",
                      name,
-                     StateNumber(query.state).value_or(0),
-                     text(query.session),
-                     query.has_data ? (*query.has_data ? "yes" : "no") : "",
-                     text(query.in_table),
-                     RangeText(query.receive_time_ns),
-                     RangeText(query.calibration_version),
-                     RangeText(query.landmarks),
-                     RangeText(query.observations),
-                     RangeText(query.temperature_c),
-                     query.scored_group.size(),
-                     query.scored_group,
-                     RangeText(query.entropy_nats),
-                     RangeText(query.gain_nats),
-                     static_cast<int>(query.order),
-                     query.order_group.size(),
-                     query.order_group,
-                     query.descending);
+                     TextOf(properties),
+                     TextOf(ranges),
+                     TextOf(scores),
+                     TextOf(order));
 }
 
 absl::Status CheckOrderOfAll(const SegmentQuery& query) {
-  if (query.order == SegmentQuery::Order::kArrival ||
-      query.order == SegmentQuery::Order::kGain) {
-    return absl::OkStatus();
+  switch (query.order) {
+    case SegmentQuery::Order::kArrival:
+    case SegmentQuery::Order::kTemperature:
+    case SegmentQuery::Order::kAngularRate:
+    case SegmentQuery::Order::kAcceleration:
+    case SegmentQuery::Order::kGain:
+      return absl::OkStatus();
+    default:
+      return absl::InvalidArgumentError(
+          "the segments of all rigs can be sorted by receive_time, "
+          "temperature_c, angular_rate, acceleration or gain.GROUP: name a rig "
+          "to sort by this field");
   }
-  return absl::InvalidArgumentError(
-      "the segments of all rigs can be sorted by receive_time or gain.GROUP: "
-      "name a rig to sort by this field");
 }
 
 absl::StatusOr<SegmentPlace> PlaceOfPage(const std::string& list,
@@ -218,16 +333,19 @@ std::string SelectSegments(const std::string& columns,
                            int limit,
                            SqlCondition* condition) {
   const bool of_all = rig == 0;
-  const char* const table = IsOfGroup(query.order) ? "o" : "s";
-  if (IsOfGroup(query.order)) {
-    condition->And("o.group_name = " + condition->Parameter(query.order_group));
-  }
+  const Source source = SourceOf(query, of_all);
+  const char* const table = NameOf(source);
+  AndSource(query, source, condition);
   if (!of_all) {
     condition->And(
         fmt::format("{}.rig = {}", table, condition->Parameter(rig)));
   }
-  AndFilter(query, condition);
-  const auto order = OrderColumns(query, of_all);
+  SegmentProperties properties = query;
+  if (source == Source::kExclusions) properties.excluded.reset();
+  AndProperties(properties, condition);
+  AndRanges(query, condition);
+  AndScores(query, condition);
+  const auto order = OrderColumns(query, source, of_all);
   const auto values = OrderValues(query, of_all, after, condition);
   condition->And(fmt::format("({}) {} ({})",
                              fmt::join(order, ", "),
@@ -240,17 +358,20 @@ std::string SelectSegments(const std::string& columns,
   const std::string_view way = query.descending ? "DESC" : "ASC";
   const std::string sorted =
       fmt::format("{} {}", fmt::join(order, fmt::format(" {}, ", way)), way);
+  // A segment is excluded from several tables.
+  const char* const distinct = source == Source::kExclusions ? "DISTINCT " : "";
   return fmt::format(
-      "SELECT {}, page.key FROM (SELECT s.rig, s.sequence, {} AS key "
-      "FROM segments s {} {} WHERE {} ORDER BY {} LIMIT {}) page "
+      "SELECT {}, page.key FROM (SELECT {}{}.rig, {}.sequence, {} AS key "
+      "FROM {} {} WHERE {} ORDER BY {} LIMIT {}) page "
       "JOIN segments s USING (rig, sequence) "
       "LEFT JOIN segment_information i USING (rig, sequence) "
       "ORDER BY page.key {}, s.rig {}, s.sequence {}",
       columns,
+      distinct,
+      table,
+      table,
       order.front(),
-      IsOfGroup(query.order)
-          ? "JOIN segment_scores o ON o.rig = s.rig AND o.sequence = s.sequence"
-          : "",
+      TablesOf(source),
       some_rigs ? "JOIN rigs r ON r.rig = s.rig" : "",
       condition->sql(),
       sorted,

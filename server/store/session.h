@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/model/segment.h"
+#include "server/store/exclusion_cause.h"
 #include "server/store/segment_query.h"
 
 namespace selfcal::server {
@@ -48,19 +49,6 @@ struct SessionSegment {
 };
 
 inline constexpr int kMaxPathPoints = 16;
-
-// The numbers, from 1, are stored in the database: only ever extended.
-enum class ExclusionCause {
-  kInsufficientGain = 1,  // joint: beyond what the kept segments have
-  kOutranked,             // by all entries of the full table
-  kReplaced,              // by a later segment
-  kTooOld,
-  kDeviceChanged,
-  kDataEvicted,  // by a quota
-  kUnusable,
-  kDoesNotFit,    // larger residuals than the rig's other segments
-  kManyOutliers,  // too many of its observations are outliers
-};
 
 // An exclusion: why the table of a group does not hold a scored segment.
 struct Exclusion {

@@ -7,6 +7,8 @@
 #include <limits>
 #include <string>
 
+#include "selfcal/v1/segment.pb.h"
+#include "server/encode/encode.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -38,7 +40,8 @@ TEST(SegmentFilter, ConditionsAddUp) {
       "state = SCORED AND session=\"a \\\"b\\\" AND c\" AND has_data = false "
       "AND in_table = camera AND landmarks > 10 AND landmarks<=20 AND "
       "observations >= 7 AND calibration_version = 3 AND temperature_c >= -2.5 "
-      "AND gain.imu >= 2 AND entropy.imu <= -30.5");
+      "AND gain.imu >= 2 AND entropy.imu <= -30.5 AND angular_rate >= 0.5 AND "
+      "acceleration <= 9.5 AND excluded = DOES_NOT_FIT");
   EXPECT_EQ(query.state, SegmentState::kScored);
   EXPECT_EQ(query.session, "a \"b\" AND c");
   EXPECT_EQ(query.has_data, false);
@@ -47,6 +50,9 @@ TEST(SegmentFilter, ConditionsAddUp) {
   EXPECT_EQ(query.observations, (Range<std::int64_t>{7, {}}));
   EXPECT_EQ(query.calibration_version, (Range<std::int64_t>{3, 3}));
   EXPECT_EQ(query.temperature_c, (Range<double>{-2.5, {}}));
+  EXPECT_EQ(query.angular_rate_radps, (Range<double>{0.5, {}}));
+  EXPECT_EQ(query.acceleration_mps2, (Range<double>{{}, 9.5}));
+  EXPECT_EQ(query.excluded, ExclusionCause::kDoesNotFit);
   EXPECT_EQ(query.scored_group, "imu");
   EXPECT_EQ(query.gain_nats, (Range<double>{2, {}}));
   EXPECT_EQ(query.entropy_nats, (Range<double>{{}, -30.5}));
@@ -80,6 +86,22 @@ TEST(SegmentFilter, TimesAreRfc3339) {
   EXPECT_THAT(Error("receive_time > 9999-01-01T00:00:00Z"), HasSubstr("2262"));
 }
 
+TEST(SegmentFilter, CausesAreThoseOfExclusions) {
+  for (int k = v1::TableExclusion::CAUSE_UNSPECIFIED + 1;
+       k < v1::TableExclusion::Cause_ARRAYSIZE;
+       ++k) {
+    const std::string name = v1::TableExclusion::Cause_Name(k);
+    Exclusion exclusion;
+    exclusion.cause = Parsed("excluded = " + name).excluded.value();
+    EXPECT_EQ(v1::TableExclusion::Cause_Name(Encode("a", exclusion).cause()),
+              name);
+  }
+  EXPECT_THAT(Error("excluded = CAUSE_UNSPECIFIED"),
+              HasSubstr("a cause: INSUFFICIENT_GAIN, OUTRANKED, "));
+  EXPECT_THAT(Error("excluded = 8"), HasSubstr("a cause: "));
+  EXPECT_THAT(Error("excluded > OUTRANKED"), HasSubstr("has no order"));
+}
+
 TEST(SegmentFilter, MistakesAreNamed) {
   EXPECT_THAT(Error("colour = red"), HasSubstr("'colour' is not a field"));
   EXPECT_THAT(Error("state.x = SCORED"), HasSubstr("not a field"));
@@ -91,6 +113,7 @@ TEST(SegmentFilter, MistakesAreNamed) {
               HasSubstr("a whole number"));
   EXPECT_THAT(Error("temperature_c > nan"), HasSubstr("a number"));
   EXPECT_THAT(Error("temperature_c > 1e999"), HasSubstr("a number"));
+  EXPECT_THAT(Error("angular_rate > fast"), HasSubstr("a number"));
   EXPECT_THAT(Error("gain > 3"), HasSubstr("name the group, as gain.camera"));
   EXPECT_THAT(Error("gain.imu > 3 AND entropy.camera < 2"),
               HasSubstr("imu and camera"));
@@ -112,6 +135,10 @@ TEST(SegmentOrder, IsAFieldAndAWay) {
   EXPECT_EQ(query.order, Order::kEntropy);
   EXPECT_EQ(query.order_group, "camera");
   EXPECT_FALSE(query.descending);
+  ASSERT_TRUE(ParseSegmentOrder("angular_rate", &query).ok());
+  EXPECT_EQ(query.order, Order::kAngularRate);
+  ASSERT_TRUE(ParseSegmentOrder("acceleration asc", &query).ok());
+  EXPECT_EQ(query.order, Order::kAcceleration);
   ASSERT_TRUE(ParseSegmentOrder("landmarks", &query).ok());
   EXPECT_EQ(query.order, Order::kLandmarks);
   EXPECT_TRUE(query.descending);

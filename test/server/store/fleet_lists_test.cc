@@ -1,6 +1,7 @@
 // Lists over all rigs: by time, page by page.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -230,6 +231,127 @@ TEST_P(FleetListsTest, SegmentsOfAllRigsGoByArrivalOrGain) {
   EXPECT_TRUE(absl::IsInvalidArgument(
       store_->ListSegments("", query, Page{}).status()));
   EXPECT_TRUE(store_->ListSegments("a", query, Page{}).ok());
+}
+
+TEST_P(FleetListsTest, SegmentsOfAllRigsGoByMotionAndTemperature) {
+  using Order = SegmentQuery::Order;
+  const auto add = [&](const std::string& id,
+                       int index,
+                       double scale,
+                       std::optional<double> temperature_c) {
+    MotionSegment segment = Segment(index);
+    for (KeyframeState& x : segment.keyframes) x.v_GI *= scale;
+    for (ImuSample& sample : segment.imu) sample.gyro *= 10 / scale;
+    segment.temperature_c = temperature_c;
+    ASSERT_TRUE(domain_->PutSegment(id, segment).ok());
+  };
+  for (const std::string id : {"b", "a", "c"}) {
+    ASSERT_TRUE(domain_->CreateRig(TestRig(id)).ok());
+  }
+  add("b", 0, 2, 20);
+  add("a", 0, 4, 10);
+  add("c", 0, 3, {});
+  add("a", 1, 1, 15);
+  const auto all = [&](const SegmentQuery& query, const RigQuery& of = {}) {
+    return Pages(
+        [&](const Page& page) {
+          return store_->ListSegments("", query, page, of);
+        },
+        [](const StoredSegment& segment) {
+          return segment.rig + std::to_string(segment.key.index);
+        });
+  };
+  SegmentQuery query;
+  query.order = Order::kAcceleration;
+  EXPECT_THAT(all(query), ElementsAre("a0", "c0", "b0", "a1"));
+  query.descending = false;
+  EXPECT_THAT(all(query), ElementsAre("a1", "b0", "c0", "a0"));
+  const auto b = store_->GetSegment("b", {"s", 0});
+  ASSERT_TRUE(b.ok()) << b.status();
+  query.acceleration_mps2.least = b->motion->acceleration_mps2;
+  EXPECT_THAT(all(query), ElementsAre("b0", "c0", "a0"));
+  SetLabel("a", "model", "t4");
+  RigQuery of;
+  of.labels = {{"model", "t4"}};
+  EXPECT_THAT(all(query, of), ElementsAre("a0"));
+
+  query = {};
+  query.order = Order::kAngularRate;
+  EXPECT_THAT(all(query), ElementsAre("a1", "b0", "c0", "a0"));
+  query.angular_rate_radps.most = b->motion->angular_rate_radps;
+  EXPECT_THAT(all(query), ElementsAre("b0", "c0", "a0"));
+
+  query = {};
+  query.order = Order::kTemperature;
+  EXPECT_THAT(all(query), ElementsAre("b0", "a1", "a0"));
+  query.descending = false;
+  EXPECT_THAT(all(query), ElementsAre("a0", "a1", "b0"));
+}
+
+TEST_P(FleetListsTest, SegmentsOfAllRigsAreFoundByStateAndCause) {
+  for (const std::string id : {"a", "b"}) {
+    ASSERT_TRUE(domain_->CreateRig(TestRig(id)).ok());
+  }
+  // The tables of both rigs hold all that are scored.
+  for (int index = 0; index < 2; ++index) {
+    for (const std::string id : {"b", "a"}) {
+      now_ns_ += 1'000'000'000;
+      Put(id, index);
+      Score(TestRig(id), index, 1.0);
+    }
+  }
+  now_ns_ += 1'000'000'000;
+  Put("b", 2);
+  Put("a", 2);
+  for (const std::string id : {"a", "b"}) {
+    ASSERT_TRUE(
+        domain_->QuarantineSegments(id, "s", {}, "eve", "diverged").ok());
+  }
+  now_ns_ += 1'000'000'000;
+  Put("b", 3);
+  now_ns_ += 1'000'000'000;
+  Put("a", 3);
+  const auto all = [&](const SegmentQuery& query, const RigQuery& of = {}) {
+    return Pages(
+        [&](const Page& page) {
+          return store_->ListSegments("", query, page, of);
+        },
+        [](const StoredSegment& segment) {
+          return segment.rig + std::to_string(segment.key.index);
+        });
+  };
+  SegmentQuery stored;
+  stored.state = SegmentState::kStored;
+  EXPECT_THAT(all(stored), ElementsAre("a3", "b3"));
+  SegmentQuery unusable;
+  unusable.state = SegmentState::kUnusable;
+  EXPECT_THAT(all(unusable), SizeIs(6));
+  // From all tables of the rig, and listed once. What no table held is not
+  // excluded.
+  SegmentQuery excluded;
+  excluded.excluded = ExclusionCause::kUnusable;
+  ASSERT_GT(store_->ListExclusions("a", {"s", 0})->size(), 1u);
+  EXPECT_THAT(all(excluded), ElementsAre("a1", "b1", "a0", "b0"));
+  excluded.state = SegmentState::kScored;
+  EXPECT_THAT(all(excluded), SizeIs(0));
+  excluded.state = SegmentState::kUnusable;
+  excluded.descending = false;
+  EXPECT_THAT(all(excluded), ElementsAre("b0", "a0", "b1", "a1"));
+  excluded.excluded = ExclusionCause::kTooOld;
+  EXPECT_THAT(all(excluded), SizeIs(0));
+
+  SetLabel("b", "model", "t4");
+  RigQuery of;
+  of.labels = {{"model", "t4"}};
+  excluded.excluded = ExclusionCause::kUnusable;
+  EXPECT_THAT(all(excluded, of), ElementsAre("b0", "b1"));
+  EXPECT_THAT(all(unusable, of), ElementsAre("b2", "b1", "b0"));
+  EXPECT_THAT(all(stored, of), ElementsAre("b3"));
+
+  const auto page = store_->ListSegments("", unusable, {1, ""});
+  ASSERT_TRUE(page.ok()) << page.status();
+  EXPECT_TRUE(absl::IsInvalidArgument(
+      store_->ListSegments("", excluded, {1, page->next_token}).status()));
 }
 
 // Every list of many rigs has those that have one of the names or labels, and

@@ -1,6 +1,8 @@
 // A list by query against the plain list, filtered and sorted here.
 #include <algorithm>
+#include <map>
 #include <random>
+#include <set>
 
 #include "test/server/store/store_test.h"
 
@@ -12,7 +14,8 @@ using Key = std::optional<double>;
 
 class SegmentQueryTest : public StoreTest {
  protected:
-  // Segments of two sessions: some without temperature, score or data.
+  // Segments of two sessions: some without temperature, score or data, and some
+  // that are unusable. Several have the same motion.
   void Fill() {
     const Rig rig = CreateTestRig("a");
     groups_ = {rig.groups.front().name, rig.groups.back().name};
@@ -25,6 +28,8 @@ class SegmentQueryTest : public StoreTest {
         return seen.landmark >= static_cast<int>(segment.landmarks.size());
       });
       if (k % 2 == 0) segment.temperature_c = std::round(draw(random));
+      for (KeyframeState& x : segment.keyframes) x.v_GI *= 1 + k % 5;
+      for (ImuSample& sample : segment.imu) sample.gyro *= 1 + k % 7;
       ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
       if (k >= 30) continue;
       ASSERT_TRUE(domain_
@@ -36,8 +41,28 @@ class SegmentQueryTest : public StoreTest {
                                                     k))
                       .ok());
     }
+    const auto tables = store_->GetTables("a");
+    ASSERT_TRUE(tables.ok()) << tables.status();
+    for (const Table& table : *tables) {
+      ASSERT_FALSE(table.entries.empty());
+      Quarantine(table.entries.front().key);
+    }
+    Quarantine({"s", 35});
     all_ = store_->ListSegments("a", {1000, ""})->items;
     ASSERT_EQ(all_.size(), 40u);
+    for (const StoredSegment& segment : all_) {
+      const auto exclusions = store_->ListExclusions("a", segment.key);
+      ASSERT_TRUE(exclusions.ok()) << exclusions.status();
+      for (const Exclusion& exclusion : *exclusions) {
+        causes_[segment.sequence].insert(exclusion.cause);
+      }
+    }
+  }
+
+  void Quarantine(const SegmentKey& key) {
+    const auto done = domain_->QuarantineSegments(
+        "a", key.session, key.index, "eve", "diverged");
+    ASSERT_TRUE(done.ok()) << done.status();
   }
 
   static const GroupScore* Score(const StoredSegment& segment,
@@ -56,7 +81,12 @@ class SegmentQueryTest : public StoreTest {
            (!range.most || *value <= *range.most);
   }
 
-  static bool Matches(const StoredSegment& segment, const SegmentQuery& query) {
+  bool IsExcluded(const StoredSegment& segment, ExclusionCause cause) const {
+    const auto found = causes_.find(segment.sequence);
+    return found != causes_.end() && found->second.contains(cause);
+  }
+
+  bool Matches(const StoredSegment& segment, const SegmentQuery& query) const {
     const GroupScore* score = Score(segment, query.scored_group);
     return (!query.state || segment.state == *query.state) &&
            (!query.session || segment.key.session == *query.session) &&
@@ -70,6 +100,11 @@ class SegmentQueryTest : public StoreTest {
            In(query.landmarks, std::optional(segment.landmarks)) &&
            In(query.observations, std::optional(segment.observations)) &&
            In(query.temperature_c, segment.temperature_c) &&
+           In(query.angular_rate_radps,
+              std::optional(segment.motion->angular_rate_radps)) &&
+           In(query.acceleration_mps2,
+              std::optional(segment.motion->acceleration_mps2)) &&
+           (!query.excluded || IsExcluded(segment, *query.excluded)) &&
            (query.scored_group.empty() ||
             (score != nullptr &&
              In(query.entropy_nats, std::optional(score->entropy)) &&
@@ -87,6 +122,10 @@ class SegmentQueryTest : public StoreTest {
         return segment.observations;
       case Order::kTemperature:
         return segment.temperature_c;
+      case Order::kAngularRate:
+        return segment.motion->angular_rate_radps;
+      case Order::kAcceleration:
+        return segment.motion->acceleration_mps2;
       case Order::kEntropy:
         return score == nullptr ? Key() : score->entropy;
       case Order::kGain:
@@ -110,12 +149,14 @@ class SegmentQueryTest : public StoreTest {
     return sequences;
   }
 
-  // All pages of three, one after the other.
-  std::vector<std::int64_t> Listed(const SegmentQuery& query) {
+  // All pages of three, one after the other. An empty rig: of all rigs, of
+  // which there is one.
+  std::vector<std::int64_t> Listed(const SegmentQuery& query,
+                                   const std::string& rig = "a") {
     std::vector<std::int64_t> sequences;
     Page page{3, ""};
     do {
-      const auto listed = store_->ListSegments("a", query, page);
+      const auto listed = store_->ListSegments(rig, query, page);
       EXPECT_TRUE(listed.ok()) << listed.status();
       if (!listed.ok()) return {};
       EXPECT_LE(listed->items.size(), 3u);
@@ -139,12 +180,12 @@ class SegmentQueryTest : public StoreTest {
     };
     SegmentQuery query;
     if (pick(3) == 0) {
-      query.state =
-          pick(2) == 0 ? SegmentState::kStored : SegmentState::kScored;
+      query.state = static_cast<SegmentState>(1 + pick(3));
     }
     if (pick(4) == 0) query.session = pick(2) == 0 ? "s" : "t";
     if (pick(4) == 0) query.has_data = pick(2) == 0;
     if (pick(4) == 0) query.in_table = groups_[pick(2)];
+    if (pick(6) == 0) query.excluded = kCauses[pick(std::size(kCauses))];
     const StoredSegment& some = all_[pick(40)];
     query.receive_time_ns = range(some.receive_time_ns, INT64_MAX);
     query.landmarks = range(std::int64_t{some.landmarks} - pick(3),
@@ -153,18 +194,31 @@ class SegmentQueryTest : public StoreTest {
         range(std::int64_t{some.observations} - 5, std::int64_t{1} << 40);
     query.temperature_c = range(-4.0, 1.0 * pick(5));
     if (pick(3) == 0) {
+      query.angular_rate_radps = range(some.motion->angular_rate_radps,
+                                       2 * some.motion->angular_rate_radps);
+      query.acceleration_mps2 = range(some.motion->acceleration_mps2,
+                                      2 * some.motion->acceleration_mps2);
+    }
+    if (pick(3) == 0) {
       query.scored_group = groups_[pick(2)];
       query.entropy_nats = range(-4.0, 1.0 * pick(5));
       query.gain_nats = range(-3.0, 4.0);
     }
-    query.order = static_cast<Order>(pick(6));
+    query.order = static_cast<Order>(pick(8));
     query.order_group = groups_[pick(2)];
     query.descending = pick(2) == 0;
     return query;
   }
 
+  static constexpr ExclusionCause kCauses[] = {
+      ExclusionCause::kInsufficientGain,
+      ExclusionCause::kOutranked,
+      ExclusionCause::kReplaced,
+      ExclusionCause::kUnusable};
+
   std::vector<std::string> groups_;
   std::vector<StoredSegment> all_;
+  std::map<std::int64_t, std::set<ExclusionCause>> causes_;  // by sequence
 };
 SELFCAL_STORE_TEST_SUITE(SegmentQueryTest);
 
@@ -172,13 +226,37 @@ TEST_P(SegmentQueryTest, EveryListHoldsWhatItsConditionsSayInItsOrder) {
   ASSERT_NO_FATAL_FAILURE(Fill());
   std::mt19937 random(1);
   int found = 0;
-  for (int trial = 0; trial < 500; ++trial) {
+  for (int trial = 0; trial < 700; ++trial) {
     const SegmentQuery query = Draw(&random);
     const auto expected = Expected(query);
     ASSERT_EQ(Listed(query), expected) << "trial " << trial;
     found += !expected.empty();
   }
   EXPECT_GT(found, 150);  // most conditions must not exclude everything
+}
+
+TEST_P(SegmentQueryTest, ListsOfAllRigsAreThoseOfTheOnlyRig) {
+  ASSERT_NO_FATAL_FAILURE(Fill());
+  std::mt19937 random(2);
+  int found = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    SegmentQuery query = Draw(&random);
+    // Every second one is that of a cause alone.
+    if (trial % 2 == 0) {
+      const bool descending = query.descending;
+      query = {};
+      query.descending = descending;
+      query.excluded = kCauses[trial / 2 % std::size(kCauses)];
+    }
+    if (query.order == Order::kLandmarks ||
+        query.order == Order::kObservations || query.order == Order::kEntropy) {
+      continue;
+    }
+    const auto expected = Expected(query);
+    ASSERT_EQ(Listed(query, ""), expected) << "trial " << trial;
+    found += !expected.empty();
+  }
+  EXPECT_GT(found, 200);
 }
 
 TEST_P(SegmentQueryTest, ATokenIsOfItsQueryAlone) {
@@ -191,7 +269,14 @@ TEST_P(SegmentQueryTest, ATokenIsOfItsQueryAlone) {
   ascending.descending = false;
   SegmentQuery scored = by_landmarks;
   scored.state = SegmentState::kScored;
-  for (const SegmentQuery& other : {SegmentQuery(), ascending, scored}) {
+  SegmentQuery excluded = by_landmarks;
+  excluded.excluded = ExclusionCause::kOutranked;
+  SegmentQuery fast = by_landmarks;
+  fast.angular_rate_radps.least = 0;
+  SegmentQuery accelerated = by_landmarks;
+  accelerated.acceleration_mps2.least = 0;
+  for (const SegmentQuery& other :
+       {SegmentQuery(), ascending, scored, excluded, fast, accelerated}) {
     EXPECT_TRUE(absl::IsInvalidArgument(
         store_->ListSegments("a", other, {3, page->next_token}).status()));
   }

@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "server/domain/calibration_life.h"
+#include "server/store/driver/sql_condition.h"
 #include "server/store/make_store.h"
 #include "server/store/postgres/postgres.h"
+#include "server/store/segment_query_sql.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/postgres/postgres_test.h"
 
@@ -133,6 +135,44 @@ TEST_F(PostgresSchemaTest, KeysBeginWithTheRig) {
                         "WHERE relkind = 'S' "
                         "AND relnamespace = current_schema()::regnamespace"),
               IsEmpty());
+}
+
+// With few rows, the planner prefers other ways than those that many rows need.
+TEST_F(PostgresSchemaTest, SegmentsOfAllRigsCanBeReadFromTheIndexOfTheirList) {
+  ASSERT_TRUE(db_->Execute("SET enable_seqscan = off; SET enable_sort = off;"
+                           "SET enable_bitmapscan = off")
+                  .ok());
+  using Order = SegmentQuery::Order;
+  std::vector<std::pair<SegmentQuery, std::string>> lists(6);
+  lists[0].first.order = Order::kTemperature;
+  lists[0].second = "all_segments_by_temperature";
+  lists[1].first.order = Order::kAngularRate;
+  lists[1].second = "all_segments_by_angular_rate";
+  lists[2].first.order = Order::kAcceleration;
+  lists[2].first.acceleration_mps2.least = 2;
+  lists[2].second = "all_segments_by_acceleration";
+  lists[3].first.state = SegmentState::kUnusable;
+  lists[3].second = "unusable_segments_by_time";
+  lists[4].first.state = SegmentState::kStored;
+  lists[4].second = "stored_segments_by_time";
+  lists[5].first.excluded = ExclusionCause::kDoesNotFit;
+  lists[5].second = "rare_absences_by_time";
+  for (const bool descending : {true, false}) {
+    for (auto [query, expected] : lists) {
+      query.descending = descending;
+      const auto after = PlaceOfPage("list", query, {});
+      ASSERT_TRUE(after.ok()) << after.status();
+      SqlCondition condition;
+      const std::string sql =
+          SelectSegments("s.session", 0, query, {}, *after, 51, &condition);
+      Statement plan(db_.get(), "EXPLAIN " + sql);
+      condition.Bind(&plan);
+      std::string steps;
+      while (plan.Next()) steps += plan.Text(0) + "\n";
+      EXPECT_TRUE(plan.status().ok()) << plan.status();
+      EXPECT_THAT(steps, HasSubstr(expected)) << sql;
+    }
+  }
 }
 
 TEST_F(PostgresSchemaTest, ASoundSchemaHasNoProblems) {

@@ -79,6 +79,18 @@ class FixturesTest : public SqliteTest {
     EXPECT_EQ(rows(), all);
   }
 
+  // Segments from before schema version 24 are in no list by their motion.
+  void ExpectSegmentsWithMotion(std::size_t expected) {
+    SegmentQuery query;
+    query.order = SegmentQuery::Order::kAngularRate;
+    const auto listed = store_->ListSegments("", query, Page{});
+    ASSERT_TRUE(listed.ok()) << listed.status();
+    EXPECT_EQ(listed->items.size(), expected);
+    for (const StoredSegment& segment : listed->items) {
+      EXPECT_TRUE(segment.motion.has_value());
+    }
+  }
+
   static std::int64_t Version(const std::string& path) {
     return ReadIntInFile(path, "PRAGMA user_version").value_or(-1);
   }
@@ -125,6 +137,7 @@ TEST_F(FixturesTest, EverySchemaThatWasReleasedOpensWithAllItHeld) {
     MotionSegment segment = FixtureSegments()[0];
     segment.key = {"later", 0};
     EXPECT_TRUE(domain_->PutSegment("a", segment).ok());
+    ExpectSegmentsWithMotion(version >= 24 ? 5 : 1);
     EXPECT_TRUE(domain_
                     ->CommitScore(
                         "a", {"s", 3}, FakeInformation(FixtureRig(), 0.5, 5, 9))

@@ -11,11 +11,16 @@
 #include "server/domain/calibration_life.h"
 #include "server/store/driver/sql_condition.h"
 #include "server/store/reported_tables.h"
+#include "server/store/segment_query_sql.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite/sqlite_test.h"
 
 namespace selfcal::server {
 namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr CalibrationState kStates[] = {CalibrationState::kActive,
                                         CalibrationState::kSuperseded,
@@ -325,6 +330,47 @@ TEST_F(SchemaTest, StatementsReadTheRowsThatTheyNeed) {
     std::vector<std::string> steps;
     while (plan.Next()) steps.push_back(plan.Text(3));
     EXPECT_EQ(steps, expected) << sql;
+  }
+}
+
+// The other steps of a plan read the rows of a page by their keys.
+TEST_F(SchemaTest, SegmentsOfAllRigsAreReadFromTheIndexOfTheirList) {
+  store_.reset();
+  const auto db = SqliteConnection::Open(Path(), SQLITE_OPEN_READWRITE);
+  ASSERT_TRUE(db.ok());
+  using Order = SegmentQuery::Order;
+  std::vector<std::pair<SegmentQuery, std::string>> lists(6);
+  lists[0].first.order = Order::kTemperature;
+  lists[0].second = "SEARCH s USING COVERING INDEX all_segments_by_temperature";
+  lists[1].first.order = Order::kAngularRate;
+  lists[1].second =
+      "SEARCH s USING COVERING INDEX all_segments_by_angular_rate";
+  lists[2].first.order = Order::kAcceleration;
+  lists[2].first.acceleration_mps2.least = 2;
+  lists[2].second =
+      "SEARCH s USING COVERING INDEX all_segments_by_acceleration";
+  lists[3].first.state = SegmentState::kUnusable;
+  lists[3].second = "SEARCH s USING INDEX unusable_segments_by_time";
+  lists[4].first.state = SegmentState::kStored;
+  lists[4].second = "SEARCH s USING INDEX unscored_segments";
+  lists[5].first.excluded = ExclusionCause::kDoesNotFit;
+  lists[5].second = "SEARCH a USING COVERING INDEX rare_absences_by_time";
+  for (const bool descending : {true, false}) {
+    for (auto [query, expected] : lists) {
+      query.descending = descending;
+      const auto after = PlaceOfPage("list", query, {});
+      ASSERT_TRUE(after.ok()) << after.status();
+      SqlCondition condition;
+      const std::string sql =
+          SelectSegments("s.session", 0, query, {}, *after, 51, &condition);
+      Statement plan(db->get(), "EXPLAIN QUERY PLAN " + sql);
+      condition.Bind(&plan);
+      std::vector<std::string> steps;
+      while (plan.Next()) steps.push_back(plan.Text(3));
+      EXPECT_TRUE(plan.status().ok()) << plan.status();
+      EXPECT_THAT(steps, Contains(HasSubstr(expected))) << sql;
+      EXPECT_THAT(steps, Not(Contains(HasSubstr("FOR DISTINCT")))) << sql;
+    }
   }
 }
 
