@@ -12,9 +12,9 @@ namespace selfcal::client {
 
 inline constexpr char kSegmentFilterHelp[] =
     "Conditions joined by AND, e.g. 'state = SCORED AND gain.camera >= 2'; "
-    "fields: state, session, has_data, in_table, receive_time, "
+    "fields: state, session, has_data, in_table, excluded, receive_time, "
     "calibration_version, landmarks, observations, temperature_c, "
-    "entropy.GROUP, gain.GROUP";
+    "angular_rate, acceleration, entropy.GROUP, gain.GROUP";
 
 // A flag and its value.
 struct GivenFlag {

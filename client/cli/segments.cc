@@ -31,6 +31,11 @@ std::string TemperatureText(const v1::Segment& segment) {
              : "-";
 }
 
+// A quantity of the motion.
+std::string MotionText(const v1::Segment& segment, double value) {
+  return segment.has_motion() ? fmt::format("{:.2f}", value) : "-";
+}
+
 // Returns the groups of the rigs, in the order of the first that has them.
 std::vector<std::string> Groups(const v1::ListSegmentsResponse& segments) {
   std::vector<std::string> groups;
@@ -94,6 +99,8 @@ Table ListTable(const v1::ListSegmentsResponse& segments, bool of_many) {
   }
   columns.push_back({"in tables"});
   columns.push_back({"T [C]", true});
+  columns.push_back({"w [rad/s]", true});
+  columns.push_back({"a [m/s^2]", true});
   if (of_many) columns.insert(columns.begin(), Column{"rig"});
   Table table(std::move(columns));
   for (const v1::Segment& segment : segments.segments()) {
@@ -110,6 +117,8 @@ Table ListTable(const v1::ListSegmentsResponse& segments, bool of_many) {
     }
     row.push_back(TablesText(segment));
     row.push_back(TemperatureText(segment));
+    row.push_back(MotionText(segment, segment.motion().angular_rate()));
+    row.push_back(MotionText(segment, segment.motion().acceleration()));
     if (of_many) row.insert(row.begin(), RigPart(segment.name()));
     table.Add(std::move(row));
   }
@@ -129,6 +138,13 @@ Facts Describe(const v1::Segment& segment) {
   facts.Add("keyframes", fmt::format("{}", segment.keyframes()));
   if (segment.has_temperature_c()) {
     facts.Add("temperature", TemperatureText(segment) + " C");
+  }
+  if (segment.has_motion()) {
+    const v1::Segment::Motion& motion = segment.motion();
+    facts.Add("angular rate",
+              MotionText(segment, motion.angular_rate()) + " rad/s");
+    facts.Add("acceleration",
+              MotionText(segment, motion.acceleration()) + " m/s^2");
   }
   facts.Add("IMU samples", fmt::format("{}", segment.imu_samples()));
   facts.Add("landmarks", fmt::format("{}", segment.landmarks()));
@@ -394,7 +410,8 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   list->add_option("--order-by",
                    options->order_by,
                    "A field, then asc or desc, e.g. 'entropy.camera asc'; "
-                   "without RIG: receive_time or gain.GROUP");
+                   "without RIG: receive_time, temperature_c, angular_rate, "
+                   "acceleration or gain.GROUP");
   list->add_flag("--quarantined",
                  options->quarantined,
                  "List only unusable and quarantined segments, with the "

@@ -57,6 +57,11 @@ _OWN = {
     },
 }
 
+# Of the segments after the first walk, in a row r of the batch: one in a
+# thousand each.
+_UNUSABLE = "(r.walk > 0 AND (r.k * 7919 + r.n) % 1000 = 1)"
+_MISFIT = "(r.walk > 0 AND (r.k * 7919 + r.n) % 1000 = 2)"
+
 Say = Callable[[str], None]
 
 
@@ -227,6 +232,9 @@ def _fill_batch(cursor) -> None:
         "segments",
         {
             **own,
+            "state": f"CASE WHEN {_UNUSABLE} THEN 3 ELSE t.state END",
+            "problem": f"CASE WHEN {_UNUSABLE} THEN 'quarantined' "
+            "ELSE t.problem END",
             "session": "CASE r.walk WHEN 0 THEN t.session "
             "ELSE 'walk-' || r.walk END",
             "session_index": "CASE r.walk WHEN 0 THEN t.session_index "
@@ -234,6 +242,8 @@ def _fill_batch(cursor) -> None:
             "receive_time_ns": "r.receive_time_ns",
             "steady_ns": "r.receive_time_ns",
             "temperature_c": "10 + 40 * random()",
+            "angular_rate": "t.angular_rate * (0.5 + random())",
+            "acceleration": "t.acceleration * (0.5 + random())",
         },
         f"batch r JOIN copied.segments t {of_copy}",
     )
@@ -265,16 +275,29 @@ def _fill_batch(cursor) -> None:
     _insert(
         cursor,
         "table_absences",
-        own,
+        # As the trigger does, which is off: of the rare causes alone.
+        {
+            **own,
+            "steady_ns": "CASE WHEN t.cause > 3 THEN r.receive_time_ns END",
+        },
         f"batch r JOIN copied.table_absences t {of_copy} AND r.walk = 0",
     )
-    # Later ones are outranked (2) by the entries of the first walk.
+    # Later ones are outranked (2) by the entries of the first walk; some do
+    # not fit (8).
+    later = (
+        f"FROM batch r JOIN copied.segment_scores t {of_copy} AND r.walk > 0"
+    )
     cursor.execute(
         "INSERT INTO table_absences (rig, sequence, group_name, cause, "
         "  time_ns, rival, rival_entropy) "
         "SELECT r.rig, r.k, t.group_name, 2, r.receive_time_ns, "
-        "  1, t.entropy - 1 "
-        f"FROM batch r JOIN copied.segment_scores t {of_copy} AND r.walk > 0"
+        f"  1, t.entropy - 1 {later} AND NOT ({_MISFIT})"
+    )
+    cursor.execute(
+        "INSERT INTO table_absences (rig, sequence, group_name, cause, "
+        "  time_ns, fit, fit_limit, steady_ns) "
+        "SELECT r.rig, r.k, t.group_name, 8, r.receive_time_ns, "
+        f"  5, 1.5, r.receive_time_ns {later} AND {_MISFIT}"
     )
     _insert(
         cursor,

@@ -73,6 +73,42 @@ def _with(path: str, **parameters) -> str:
     return f"{path}?{urllib.parse.urlencode(parameters)}"
 
 
+_LISTS_OF_ALL = {
+    "by temperature": {"order_by": "temperature_c desc"},
+    "by angular rate": {"order_by": "angular_rate desc"},
+    "by acceleration, of a range": {
+        "order_by": "acceleration asc",
+        "filter": "acceleration >= 1",
+    },
+    "that are unusable": {"filter": "state = UNUSABLE"},
+    "that wait for their score": {"filter": "state = STORED"},
+    "that do not fit": {"filter": "excluded = DOES_NOT_FIT"},
+    "that are too old": {"filter": "excluded = TOO_OLD"},
+}
+
+
+def _segments_of_all(size: int, model: str) -> list[Request]:
+    """Those that an index of their own serves, also with a label."""
+
+    def page(**parameters) -> Callable[[], str]:
+        return lambda: _with("segments", page_size=size, **parameters)
+
+    found = []
+    for name, parameters in _LISTS_OF_ALL.items():
+        # The others may be of no segment.
+        items = "segments" if "order_by" in parameters else ""
+        found += [
+            Request(f"segments of all {name}", page(**parameters), items, True),
+            Request(
+                f"... of a model, {name}",
+                page(**parameters, rig_filter=model),
+                "",
+                True,
+            ),
+        ]
+    return found
+
+
 def _fleet_wide(of: Fleet, size: int) -> list[Request]:
     def page(path: str, **parameters) -> Callable[[], str]:
         return lambda: _with(path, page_size=size, **parameters)
@@ -125,6 +161,7 @@ def _fleet_wide(of: Fleet, size: int) -> list[Request]:
             "segments",
             True,
         ),
+        *_segments_of_all(size, model),
         Request(
             "segments of all of a model",
             page("segments", rig_filter=model),
@@ -218,12 +255,15 @@ _ORDERS = (
     "gain.camera desc",
     "landmarks desc",
     "temperature_c desc",
+    "angular_rate desc",
 )
 _FILTERS = (
     "state = SCORED AND gain.camera >= 0.5",
     "in_table = camera",
     'session = "walk"',
     "temperature_c >= 49",
+    "state = UNUSABLE",
+    "excluded = DOES_NOT_FIT",
     "has_data = true",
 )
 

@@ -34,6 +34,16 @@ def segment_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:
                 if segment.HasField("temperature_c")
                 else float("nan")
             ),
+            "angular_rate": (
+                segment.motion.angular_rate
+                if segment.HasField("motion")
+                else float("nan")
+            ),
+            "acceleration": (
+                segment.motion.acceleration
+                if segment.HasField("motion")
+                else float("nan")
+            ),
             "kept": any(score.in_table for score in segment.scores),
         }
         for score in segment.scores:

@@ -221,7 +221,11 @@ v1::Segment ScoredSegment(int index) {
   segment.set_state(v1::Segment::SCORED);
   segment.set_end_ns(3'900'000'000);
   segment.set_keyframes(40);
-  if (index > 0) segment.set_temperature_c(21.25 * index);
+  if (index > 0) {
+    segment.set_temperature_c(21.25 * index);
+    segment.mutable_motion()->set_angular_rate(0.5 * index);
+    segment.mutable_motion()->set_acceleration(1.25 * index);
+  }
   for (const char* group : {"imu", "camera"}) {
     v1::GroupScore* score = segment.add_scores();
     score->set_group(group);
@@ -241,9 +245,12 @@ TEST_F(Commands, ListsSegmentsWithTheirEntropies) {
   const Outcome outcome = Selfcal({"segments", "list", "device"});
   EXPECT_EQ(daemon_.last_name, "rigs/device");
   EXPECT_EQ(outcome.out,
-            "walk~2\tstored\t-\t40\t3.90\t0\t0\t-\t-\t-\t42.5\n"
-            "walk~1\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\t21.2\n"
-            "walk~0\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\t-\n");
+            "walk~2\tstored\t-\t40\t3.90\t0\t0\t-\t-\t-\t42.5"
+            "\t1.00\t2.50\n"
+            "walk~1\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\t21.2"
+            "\t0.50\t1.25\n"
+            "walk~0\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\t-\t-"
+            "\t-\n");
 }
 
 TEST_F(Commands, AsksForSegmentsByFilterAndOrder) {
