@@ -138,6 +138,32 @@ absl::Status CheckDueRigs(Store* store,
   return CheckRigs(store, clock, names, check, until_ns, look, started);
 }
 
+// Writes what these versions lack. Returns of how many; damaged ones stay as
+// they are.
+absl::StatusOr<int> Complete(Store* store,
+                             const Clock& clock,
+                             const std::vector<VersionId>& versions,
+                             absl::Status (*write)(UnitOfWork*,
+                                                   const StoredCalibration&)) {
+  int written = 0;
+  for (const auto& [rig, version] : versions) {
+    const absl::Status status = store->Transact(
+        rig,
+        clock(),
+        [write, number = version](UnitOfWork* tx) -> absl::Status {
+          SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration calibration,
+                                   ReadCalibration(tx, number));
+          return write(tx, calibration);
+        });
+    if (status.ok()) {
+      ++written;
+    } else if (!absl::IsNotFound(status) && !absl::IsDataLoss(status)) {
+      return status;
+    }
+  }
+  return written;
+}
+
 }  // namespace
 
 absl::StatusOr<StoredRig> Domain::CreateRig(const StoredRig& rig) {
@@ -291,21 +317,13 @@ absl::StatusOr<StoredCalibration> Domain::ActivateCalibration(
 absl::StatusOr<int> Domain::CompleteEstimates(int limit) {
   SELFCAL_ASSIGN_OR_RETURN(const auto versions,
                            store_->ListWithoutEstimates(limit));
-  int written = 0;
-  for (const auto& [rig, version] : versions) {
-    const absl::Status status = store_->Transact(
-        rig, clock_(), [number = version](UnitOfWork* tx) -> absl::Status {
-          SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration calibration,
-                                   ReadCalibration(tx, number));
-          return InsertEstimates(tx, calibration);
-        });
-    if (status.ok()) {
-      ++written;
-    } else if (!absl::IsNotFound(status) && !absl::IsDataLoss(status)) {
-      return status;
-    }
-  }
-  return written;
+  return Complete(store_, clock_, versions, InsertEstimates);
+}
+
+absl::StatusOr<int> Domain::CompleteVersions(int limit) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto versions,
+                           store_->ListIncompleteVersions(limit));
+  return Complete(store_, clock_, versions, WriteListColumns);
 }
 
 absl::Status Domain::ReportDisagreement(const std::string& rig,

@@ -163,6 +163,8 @@ class Domain {
   // Writes the estimates of at most `limit` versions that have none, from
   // before they were stored with the version. Returns how many it has written.
   absl::StatusOr<int> CompleteEstimates(int limit);
+  // The same with the verdict and the temperature by which lists find them.
+  absl::StatusOr<int> CompleteVersions(int limit);
 
   // Records the finding of a verification by which the two cores disagree, with
   // the version concerned and in an event. A version keeps the first finding.

@@ -14,9 +14,6 @@
 namespace selfcal::server {
 namespace {
 
-// Versions from before estimates were stored that get them at once.
-constexpr int kEstimates = 1000;
-
 // How often devices are looked for that have become silent: they are so for a
 // day.
 constexpr std::chrono::minutes kSilentInterval{1};
@@ -40,7 +37,8 @@ Recalibrator::Recalibrator(Domain* domain,
               run_watchers,
               nullptr,
               ""},
-      calibration_watchers_(calibration_watchers) {
+      calibration_watchers_(calibration_watchers),
+      completion_(domain) {
   for (int k = 0; k < std::max(1, options.solver_processes); ++k) {
     executors_.push_back(std::make_unique<Executor>(shared_));
   }
@@ -206,16 +204,7 @@ absl::Status Recalibrator::StartDueRuns() {
       SELFCAL_RETURN_IF_ERROR(shared_.domain->NoteSilentDevices());
       look_for_silent_ = now + kSilentInterval;
     }
-    if (!estimates_complete_) {
-      // Nothing else depends on it.
-      const auto written = shared_.domain->CompleteEstimates(kEstimates);
-      if (written.ok()) {
-        estimates_complete_ = *written == 0;
-      } else {
-        spdlog::warn("parameters of some versions are not in lists yet: {}",
-                     written.status().ToString());
-      }
-    }
+    completion_.Continue();
   }
   std::vector<std::string> ended = sessions_.Due(SessionEnds::Clock::now());
   SELFCAL_ASSIGN_OR_RETURN(

@@ -26,6 +26,7 @@
 #include "server/pipeline/run_context.h"
 #include "server/pipeline/run_execution.h"
 #include "server/pipeline/session_ends.h"
+#include "server/pipeline/version_completion.h"
 
 namespace selfcal::server {
 
@@ -89,7 +90,7 @@ class Recalibrator {
   Watchers<StoredCalibration>* const calibration_watchers_;
   SessionEnds sessions_;
   std::mutex starting_;  // one thread at a time creates runs; guards these:
-  bool estimates_complete_ = false;
+  VersionCompletion completion_;
   SessionEnds::Clock::time_point look_for_silent_{};  // at this time again
   std::vector<std::unique_ptr<Executor>> executors_;
 

@@ -1,4 +1,10 @@
 // Record of a calibration.
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/wire_format_lite.h>
+
+#include <cstdint>
+#include <set>
+
 #include "proto/convert.h"
 #include "server/convert/convert.h"
 #include "server/status/status_macros.h"
@@ -42,7 +48,43 @@ std::string SerializeCalibration(const StoredCalibration& calibration) {
 
 namespace {
 
-bool ParseBytes(std::string_view bytes, store::CalibrationRecord* record) {
+using VersionRecord = store::CalibrationRecord;
+
+// The bytes of a message without some of its fields, which are then not parsed.
+// Bytes that are no message remain as they are: the parser refuses them.
+std::string WithoutFields(const std::set<int>& fields, std::string_view bytes) {
+  using google::protobuf::internal::WireFormatLite;
+  const int size = static_cast<int>(bytes.size());
+  google::protobuf::io::CodedInputStream in(
+      reinterpret_cast<const std::uint8_t*>(bytes.data()), size);
+  std::string kept;
+  for (int begin = 0; begin < size; begin = in.CurrentPosition()) {
+    const std::uint32_t tag = in.ReadTag();
+    if (tag == 0 || !WireFormatLite::SkipField(&in, tag)) {
+      return std::string(bytes);
+    }
+    if (fields.contains(WireFormatLite::GetTagFieldNumber(tag))) continue;
+    kept.append(bytes.substr(begin, in.CurrentPosition() - begin));
+  }
+  return kept;
+}
+
+// Fields of the record that only some readers need; most of its bytes.
+const std::set<int>& StepFields() {
+  static const std::set<int>& fields =
+      *new std::set<int>{VersionRecord::kStepsFieldNumber};
+  return fields;
+}
+const std::set<int>& DetailFields() {
+  static const std::set<int>& fields =
+      *new std::set<int>{VersionRecord::kStepsFieldNumber,
+                         VersionRecord::kCovarianceFieldNumber,
+                         VersionRecord::kCovarianceOfDataFieldNumber,
+                         VersionRecord::kSettingsFieldNumber};
+  return fields;
+}
+
+bool ParseBytes(std::string_view bytes, VersionRecord* record) {
   if (!ParseStored(bytes, record)) {
     return false;
   }
@@ -54,8 +96,8 @@ bool ParseBytes(std::string_view bytes, store::CalibrationRecord* record) {
 }
 
 // Without the steps.
-absl::StatusOr<StoredCalibration> FromRecord(
-    const store::CalibrationRecord& record, const std::string& what) {
+absl::StatusOr<StoredCalibration> FromRecord(const VersionRecord& record,
+                                             const std::string& what) {
   StoredCalibration calibration;
   if (!FromProto(record.theta(), "", &calibration.theta).empty() ||
       !GetMatrix(record.covariance(), &calibration.covariance) ||
@@ -95,7 +137,7 @@ absl::StatusOr<StoredCalibration> FromRecord(
 
 absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
                                                    const std::string& what) {
-  store::CalibrationRecord record;
+  VersionRecord record;
   if (!ParseBytes(bytes, &record)) return DamagedRecord(what);
   SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration,
                            FromRecord(record, what));
@@ -110,15 +152,28 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
 
 absl::StatusOr<StoredCalibration> ParseWithoutSteps(std::string_view bytes,
                                                     const std::string& what) {
-  store::CalibrationRecord record;
-  if (!ParseBytes(bytes, &record)) return DamagedRecord(what);
+  VersionRecord record;
+  if (!ParseBytes(WithoutFields(StepFields(), bytes), &record))
+    return DamagedRecord(what);
+  return FromRecord(record, what);
+}
+
+absl::StatusOr<StoredCalibration> ParseSummary(std::string_view bytes,
+                                               const std::string& what) {
+  VersionRecord record;
+  if (!ParseBytes(WithoutFields(DetailFields(), bytes), &record)) {
+    return DamagedRecord(what);
+  }
+  if (record.has_report()) record.mutable_report()->clear_segment_fits();
   return FromRecord(record, what);
 }
 
 absl::StatusOr<StoredCalibration> ParseReport(std::string_view bytes,
                                               const std::string& what) {
-  store::CalibrationRecord record;
-  if (!ParseBytes(bytes, &record)) return DamagedRecord(what);
+  VersionRecord record;
+  if (!ParseBytes(WithoutFields(DetailFields(), bytes), &record)) {
+    return DamagedRecord(what);
+  }
   StoredCalibration calibration;
   calibration.rig = record.rig();
   calibration.version = record.version();

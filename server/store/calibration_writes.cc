@@ -1,6 +1,10 @@
 // Writes calibration versions.
+#include <optional>
+#include <vector>
+
 #include "server/status/status_macros.h"
 #include "server/store/announcements.h"
+#include "server/store/calibration_rows.h"
 #include "server/store/calibrations.h"
 #include "server/store/checksum.h"
 #include "server/store/driver/statement.h"
@@ -30,6 +34,15 @@ absl::Status InsertContent(UnitOfWork* tx,
       .Run();
 }
 
+// The columns of a version that was inserted with its segments.
+absl::Status WriteFirstListColumns(UnitOfWork* tx, std::int64_t version) {
+  std::vector<StoredCalibration> inserted(1);
+  inserted.front().rig_key = tx->rig_row();
+  inserted.front().version = version;
+  SELFCAL_RETURN_IF_ERROR(ReadOrigins(tx->db(), &inserted));
+  return WriteListColumns(tx, inserted.front());
+}
+
 }  // namespace
 
 absl::Status InsertCalibration(UnitOfWork* tx,
@@ -48,7 +61,24 @@ absl::Status InsertCalibration(UnitOfWork* tx,
                   key.index)
             .Run());
   }
+  SELFCAL_RETURN_IF_ERROR(WriteFirstListColumns(tx, calibration.version));
   return InsertEstimates(tx, calibration);
+}
+
+absl::Status WriteListColumns(UnitOfWork* tx,
+                              const StoredCalibration& calibration) {
+  std::optional<double> temperature_c;
+  if (calibration.temperatures) {
+    temperature_c = calibration.temperatures->mean_c;
+  }
+  return Statement(tx->db(),
+                   "UPDATE calibrations SET validated = ?3, temperature_c = ?4 "
+                   "WHERE rig = ?1 AND version = ?2",
+                   tx->rig_row(),
+                   calibration.version,
+                   static_cast<int>(calibration.verdict.kind),
+                   temperature_c)
+      .Run();
 }
 
 absl::Status InsertValidation(UnitOfWork* tx,
@@ -56,13 +86,21 @@ absl::Status InsertValidation(UnitOfWork* tx,
   tx->Changed(RecordKind::kCalibration, calibration.version);
   const std::string content = SerializeValidation(calibration);
   const std::string sha256 = Sha256(content);
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(tx->db(),
+                "INSERT INTO validations (rig, version, content, sha256) "
+                "VALUES (?1, ?2, ?3, ?4)",
+                tx->rig_row(),
+                calibration.version,
+                BlobView{content},
+                BlobView{sha256})
+          .Run());
   return Statement(tx->db(),
-                   "INSERT INTO validations (rig, version, content, sha256) "
-                   "VALUES (?1, ?2, ?3, ?4)",
+                   "UPDATE calibrations SET validated = ?3 "
+                   "WHERE rig = ?1 AND version = ?2",
                    tx->rig_row(),
                    calibration.version,
-                   BlobView{content},
-                   BlobView{sha256})
+                   static_cast<int>(calibration.verdict.kind))
       .Run();
 }
 

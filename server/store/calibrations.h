@@ -36,8 +36,13 @@ absl::StatusOr<std::vector<StoredCalibration>> ReadReports(
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
     Connection* db,
     const std::string& rig,
+    const CalibrationQuery& query,
     const Page& page,
-    const RigQuery& of);
+    const RigQuery& of,
+    CalibrationParts parts);
+// Store::ListIncompleteVersions.
+absl::StatusOr<std::vector<VersionId>> IncompleteVersions(Connection* db,
+                                                          int limit);
 
 // The version of the run's candidate; nullopt if it has none.
 absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(Connection* db,
@@ -67,6 +72,10 @@ absl::StatusOr<std::int64_t> SchemaVersion(UnitOfWork* tx);
 // Writes a version, in the state that it has, with the segments of its run.
 absl::Status InsertCalibration(UnitOfWork* tx,
                                const StoredCalibration& calibration);
+// Writes the columns by which lists find a version: the verdict of its
+// validation, and the mean temperature of its segments.
+absl::Status WriteListColumns(UnitOfWork* tx,
+                              const StoredCalibration& calibration);
 // Writes the reasons, validation and verdict of a candidate.
 absl::Status InsertValidation(UnitOfWork* tx,
                               const StoredCalibration& calibration);

@@ -229,10 +229,22 @@ class DatabaseStore final : public Store {
     return Read([&](Connection* db) { return ReadReports(db, versions); });
   }
 
+  using Store::ListCalibrations;
   absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
-      const std::string& rig, const Page& page, const RigQuery& of) override {
-    return Read(
-        [&](Connection* db) { return ListCalibrationRows(db, rig, page, of); });
+      const std::string& rig,
+      const CalibrationQuery& query,
+      const Page& page,
+      const RigQuery& of,
+      CalibrationParts parts) override {
+    return Read([&](Connection* db) {
+      return ListCalibrationRows(db, rig, query, page, of, parts);
+    });
+  }
+
+  absl::StatusOr<std::vector<VersionId>> ListIncompleteVersions(
+      int limit) override {
+    return ReadForService(
+        [&](Connection* db) { return IncompleteVersions(db, limit); });
   }
 
   absl::StatusOr<Listed<StoredEstimate>> ListEstimates(
@@ -252,10 +264,13 @@ class DatabaseStore final : public Store {
     return Read([&](Connection* db) { return ReadRun(db, rig, run); });
   }
 
+  using Store::ListRuns;
   absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
+                                             const RunQuery& query,
                                              const Page& page,
                                              const RigQuery& of) override {
-    return Read([&](Connection* db) { return ListRunRows(db, rig, page, of); });
+    return Read(
+        [&](Connection* db) { return ListRunRows(db, rig, query, page, of); });
   }
 
   absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns(

@@ -42,6 +42,9 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
 // The same without the iterations of the solver, which are most of the work.
 absl::StatusOr<StoredCalibration> ParseWithoutSteps(std::string_view bytes,
                                                     const std::string& what);
+// The same also without covariances, settings and the fits of segments.
+absl::StatusOr<StoredCalibration> ParseSummary(std::string_view bytes,
+                                               const std::string& what);
 // Rig, version, report and seconds of the same record.
 absl::StatusOr<StoredCalibration> ParseReport(std::string_view bytes,
                                               const std::string& what);

@@ -105,6 +105,7 @@ absl::Status ApplyCalibration(ReportApplication* to,
   SELFCAL_RETURN_IF_ERROR(
       About(what, CheckReportedTime(written.create_time_ns)));
   SELFCAL_RETURN_IF_ERROR(About(what, CheckReported(written, *to->factory)));
+  SELFCAL_RETURN_IF_ERROR(WriteListColumns(tx, written));
   return is_there ? absl::OkStatus() : InsertEstimates(tx, written);
 }
 

@@ -1,6 +1,7 @@
 #include "server/store/runs.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cstdint>
 #include <map>
@@ -12,18 +13,25 @@
 #include "server/store/driver/statement.h"
 #include "server/store/own_rig.h"
 #include "server/store/paging.h"
+#include "server/store/query_conditions.h"
 #include "server/store/rig_lists.h"
 #include "server/store/rigs.h"
-#include "server/store/time_place.h"
+#include "server/store/row_order.h"
 
 namespace selfcal::server {
 namespace {
 
 constexpr char kRunColumns[] =
-    "SELECT g.id, r.run, r.state, r.cause, r.create_time_ns, r.end_time_ns, "
-    "  r.base_version, r.attempts, r.calibration_version, r.message, r.rig, "
-    "  r.change, r.session_ended, r.create_steady_ns, r.end_steady_ns "
-    "FROM runs r JOIN rigs g USING (rig) ";
+    "g.id, r.run, r.state, r.started_by, r.create_time_ns, r.end_time_ns, "
+    "r.base_version, r.attempts, r.calibration_version, r.message, r.rig, "
+    "r.change, r.create_steady_ns, r.end_steady_ns";
+constexpr int kRunColumnCount = 14;
+
+// Selects runs `r` of rigs `g`, for RunFromRow; without a condition.
+std::string SelectRuns() {
+  return fmt::format("SELECT {} FROM runs r JOIN rigs g USING (rig) ",
+                     kRunColumns);
+}
 
 absl::StatusOr<std::vector<SegmentKey>> ReadKeys(Statement* read) {
   std::vector<SegmentKey> keys;
@@ -60,10 +68,10 @@ absl::Status ReadSnapshots(Connection* db,
   return read.status();
 }
 
-// How the columns cause and session_ended state a trigger. Those that were
-// there first share a cause. Any other one has its number in session_ended,
-// beside the cause of a manual run, for which a program from before it takes
-// the run.
+// How the columns cause and session_ended state a trigger, with `change`: the
+// column started_by has its number. Those that were there first share a cause.
+// Any other one has its number in session_ended, beside the cause of a manual
+// run, for which a program from before it takes the run.
 struct TriggerColumns {
   std::int64_t cause = 0;
   std::int64_t session_ended = 0;
@@ -86,30 +94,13 @@ TriggerColumns ColumnsOf(RunTrigger trigger) {
   return {3, static_cast<std::int64_t>(trigger)};
 }
 
-// `change` tells two triggers with the same columns apart.
-RunTrigger TriggerOf(const TriggerColumns& columns, std::int64_t change) {
-  switch (columns.cause) {
-    case 1:
-      return change > 0 ? RunTrigger::kChangeDetected : RunTrigger::kTablesFull;
-    case 2:
-      return columns.session_ended != 0 ? RunTrigger::kSessionEnded
-                                        : RunTrigger::kTablesChanged;
-    case 4:
-      return RunTrigger::kCalibrationAged;
-    default:
-      return columns.session_ended != 0
-                 ? static_cast<RunTrigger>(columns.session_ended)
-                 : RunTrigger::kManual;
-  }
-}
-
 // All but the segments.
 StoredRun RunFromRow(const Statement& row) {
   StoredRun run;
   run.rig = row.Text(0);
   run.run = row.Int(1);
   run.state = static_cast<RunState>(row.Int(2));
-  run.trigger = TriggerOf({row.Int(3), row.Int(12)}, row.Int(11));
+  run.trigger = static_cast<RunTrigger>(row.Int(3));
   run.create_time_ns = row.Int(4);
   run.end_time_ns = row.Int(5);
   run.base_version = row.Int(6);
@@ -117,8 +108,8 @@ StoredRun RunFromRow(const Statement& row) {
   run.calibration_version = row.Int(8);
   run.message = row.Text(9);
   run.change = row.Int(11);
-  run.create_steady_ns = row.Int(13);
-  run.end_steady_ns = row.Int(14);
+  run.create_steady_ns = row.Int(12);
+  run.end_steady_ns = row.Int(13);
   return run;
 }
 
@@ -126,14 +117,16 @@ StoredRun RunFromRow(const Statement& row) {
 struct RunRows {
   std::vector<StoredRun> runs;
   std::vector<RunKey> keys;
+
+  void Add(const Statement& row) {
+    runs.push_back(RunFromRow(row));
+    keys.emplace_back(row.Int(10), runs.back().run);
+  }
 };
 
 absl::StatusOr<RunRows> ReadRunRows(Statement* read) {
   RunRows rows;
-  while (read->Next()) {
-    rows.runs.push_back(RunFromRow(*read));
-    rows.keys.emplace_back(read->Int(10), rows.runs.back().run);
-  }
+  while (read->Next()) rows.Add(*read);
   SELFCAL_RETURN_IF_ERROR(read->status());
   return rows;
 }
@@ -164,37 +157,43 @@ absl::StatusOr<std::int64_t> NewestWhere(UnitOfWork* tx,
       tx->rig_row());
 }
 
-absl::StatusOr<Listed<StoredRun>> ListRunsOfMany(Connection* db,
-                                                 const Page& page,
-                                                 const RigQuery& of) {
-  const std::string list = "runs of many " + FilterText(of);
-  SELFCAL_ASSIGN_OR_RETURN(const TimePlace place, TimePlaceOf(list, page));
-  const int size = PageSize(page);
-  SqlCondition condition(5);
-  AddRigConditions(of, "g", &condition);
-  Statement read(db,
-                 condition.reuse(),
-                 std::string(kRunColumns) +
-                     "WHERE (r.create_steady_ns, r.rig, r.run) < (?1, ?2, ?3) "
-                     "AND " +
-                     condition.sql() +
-                     " ORDER BY r.create_steady_ns DESC, r.rig DESC, "
-                     "  r.run DESC LIMIT ?4",
-                 place.steady_ns,
-                 place.rig,
-                 place.number,
-                 size + 1);
-  condition.Bind(&read);
-  SELFCAL_ASSIGN_OR_RETURN(RunRows rows, ReadRunRows(&read));
-  Listed<StoredRun> listed;
-  if (static_cast<int>(rows.runs.size()) > size) {
-    rows.runs.pop_back();
-    const auto [rig_key, run] = rows.keys[rows.runs.size() - 1];
-    listed.next_token =
-        TokenAfter(list, {rows.runs.back().create_steady_ns, rig_key, run});
+std::string RunListName(const std::string& rig,
+                        const RunQuery& query,
+                        const RigQuery& of) {
+  std::string name =
+      rig.empty() ? "runs of many " + FilterText(of) : "runs/" + rig;
+  if (query == RunQuery()) return name;
+  return fmt::format("{}?{}/{}/{}/{}/{}",
+                     name,
+                     NumberText(query.state),
+                     NumberText(query.trigger),
+                     RangeText(query.create_time_ns),
+                     static_cast<int>(query.order),
+                     query.descending);
+}
+
+// As the lists of versions are (calibration_lists.cc).
+RowOrder RunOrder(const std::string& rig, const RunQuery& query) {
+  RowOrder order{.columns = {}, .descending = query.descending};
+  if (query.order == RunQuery::Order::kDuration) {
+    order.columns.emplace_back("r.duration_ns");
+  } else if (rig.empty()) {
+    order.columns.emplace_back(query == RunQuery() ? "r.create_steady_ns"
+                                                   : "r.create_time_ns");
   }
-  SELFCAL_ASSIGN_OR_RETURN(listed.items, Complete(db, std::move(rows)));
-  return listed;
+  if (rig.empty()) order.columns.emplace_back("r.rig");
+  order.columns.emplace_back("r.run");
+  return order;
+}
+
+void AndRunQuery(const RunQuery& query, SqlCondition* to) {
+  AndIs("r.state", query.state, to);
+  AndIs("r.started_by", query.trigger, to);
+  AndRange("r.create_time_ns", query.create_time_ns, to);
+  // As the condition of the index.
+  if (query.order == RunQuery::Order::kDuration) {
+    to->And("r.duration_ns IS NOT NULL");
+  }
 }
 
 }  // namespace
@@ -203,10 +202,8 @@ absl::StatusOr<StoredRun> ReadRun(Connection* db,
                                   const std::string& rig,
                                   std::int64_t run) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  Statement read(db,
-                 std::string(kRunColumns) + "WHERE r.rig = ?1 AND r.run = ?2",
-                 rig_id,
-                 run);
+  Statement read(
+      db, SelectRuns() + "WHERE r.rig = ?1 AND r.run = ?2", rig_id, run);
   SELFCAL_ASSIGN_OR_RETURN(std::vector<StoredRun> runs, ReadAll(db, &read));
   if (runs.empty()) {
     return absl::NotFoundError(
@@ -217,31 +214,51 @@ absl::StatusOr<StoredRun> ReadRun(Connection* db,
 
 absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
                                               const std::string& rig,
+                                              const RunQuery& query,
                                               const Page& page,
                                               const RigQuery& of) {
-  if (rig.empty()) return ListRunsOfMany(db, page, of);
-  const std::string list = "runs/" + rig;
-  SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  const std::string list = RunListName(rig, query, of);
+  const RowOrder order = RunOrder(rig, query);
+  SELFCAL_ASSIGN_OR_RETURN(RowPlace place, RowPlaceOf(list, order, page));
+  SqlCondition condition;
+  if (!rig.empty()) {
+    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+    condition.And("r.rig = " + condition.Parameter(rig_id));
+  }
+  AndRunQuery(query, &condition);
+  AndAfter(order, place, &condition);
+  if (rig.empty()) AddRigConditions(of, "g", &condition);
   const int size = PageSize(page);
+  const std::string limit = condition.Parameter(std::int64_t{size + 1});
   Statement read(db,
-                 std::string(kRunColumns) +
-                     "WHERE r.rig = ?1 AND r.run < ?2 "
-                     "ORDER BY r.run DESC LIMIT ?3",
-                 rig_id,
-                 before.value_or(INT64_MAX),
-                 size + 1);
+                 condition.reuse(),
+                 fmt::format("SELECT {}, {} FROM runs r JOIN rigs g "
+                             "USING (rig) WHERE {} ORDER BY {} LIMIT {}",
+                             kRunColumns,
+                             fmt::join(order.columns, ", "),
+                             condition.sql(),
+                             OrderText(order),
+                             limit));
+  condition.Bind(&read);
   Listed<StoredRun> listed;
-  SELFCAL_ASSIGN_OR_RETURN(listed.items, ReadAll(db, &read));
-  CutPage(
-      list, size, [](const auto& item) { return item.run; }, &listed);
+  RunRows rows;
+  while (read.Next()) {
+    if (static_cast<int>(rows.runs.size()) == size) {
+      listed.next_token = TokenAfter(list, place);
+      break;
+    }
+    place = PlaceOfRow(order, read, kRunColumnCount);
+    rows.Add(read);
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_ASSIGN_OR_RETURN(listed.items, Complete(db, std::move(rows)));
   return listed;
 }
 
 absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(
     Connection* db, const std::string& replica) {
   Statement read(db,
-                 std::string(kRunColumns) +
+                 SelectRuns() +
                      "WHERE r.state IN (1, 2) AND (?1 = '' OR EXISTS "
                      "  (SELECT 1 FROM claims c "
                      "   WHERE c.rig = r.rig AND c.replica = ?1)) AND " +

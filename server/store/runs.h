@@ -22,6 +22,7 @@ absl::StatusOr<StoredRun> ReadRun(Connection* db,
 // Store::ListRuns.
 absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
                                               const std::string& rig,
+                                              const RunQuery& query,
                                               const Page& page,
                                               const RigQuery& of);
 // Store::ListUnfinishedRuns.

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/store/exclusion_cause.h"
+#include "server/store/range.h"
 
 namespace selfcal::server {
 
@@ -13,15 +14,6 @@ namespace selfcal::server {
 // (server/domain/quarantine.h). Its problem says why; its information is not
 // used any more. The numbers are those on disk and never change.
 enum class SegmentState { kStored = 1, kScored = 2, kUnusable = 3 };
-
-// A closed interval; nullopt means no bound.
-template <typename T>
-struct Range {
-  std::optional<T> least;
-  std::optional<T> most;
-
-  friend bool operator==(const Range&, const Range&) = default;
-};
 
 struct SegmentProperties {
   std::optional<SegmentState> state;

@@ -12,18 +12,11 @@
 #include "server/status/status_macros.h"
 #include "server/store/exclusions.h"
 #include "server/store/paging.h"
+#include "server/store/query_conditions.h"
 #include "server/store/rig_lists.h"
 
 namespace selfcal::server {
 namespace {
-
-template <typename T>
-void AndRange(const std::string& column,
-              const Range<T>& range,
-              SqlCondition* to) {
-  if (range.least) to->And(column + " >= " + to->Parameter(*range.least));
-  if (range.most) to->And(column + " <= " + to->Parameter(*range.most));
-}
 
 void AndProperties(const SegmentProperties& filter, SqlCondition* to) {
   // A literal, as the condition of a partial index has one.
@@ -204,31 +197,18 @@ std::vector<std::string> OrderValues(const SegmentQuery& query,
   return values;
 }
 
-// 0 for none.
-template <typename Enum>
-int NumberOf(const std::optional<Enum>& value) {
-  return value ? static_cast<int>(*value) : 0;
-}
-
 // With its length, so that no text can look like that of another part.
 std::string PartText(const std::optional<std::string>& value) {
   return value ? fmt::format("={}:{}", value->size(), *value) : "";
 }
 
-template <typename T>
-std::string RangeText(const Range<T>& range) {
-  return fmt::format("{}..{}",
-                     range.least ? fmt::format("{}", *range.least) : "",
-                     range.most ? fmt::format("{}", *range.most) : "");
-}
-
 std::string TextOf(const SegmentProperties& filter) {
   return fmt::format("{}/{}/{}/{}/{}",
-                     NumberOf(filter.state),
+                     NumberText(filter.state),
                      PartText(filter.session),
                      filter.has_data ? (*filter.has_data ? "yes" : "no") : "",
                      PartText(filter.in_table),
-                     NumberOf(filter.excluded));
+                     NumberText(filter.excluded));
 }
 
 std::string TextOf(const SegmentRanges& filter) {

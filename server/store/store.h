@@ -37,12 +37,14 @@
 #include "core/model/rig.h"
 #include "core/model/segment.h"
 #include "core/selection/tables.h"
+#include "server/store/calibration_query.h"
 #include "server/store/clock_record.h"
 #include "server/store/estimate_query.h"
 #include "server/store/moment.h"
 #include "server/store/rig_checks.h"
 #include "server/store/rig_claim.h"
 #include "server/store/rig_query.h"
+#include "server/store/run_query.h"
 #include "server/store/segment_query.h"
 #include "server/store/session.h"
 #include "server/store/stored_event.h"
@@ -106,16 +108,6 @@ struct StoredSegment {
   std::string problem;
 };
 
-// The numbers are those on disk and never change. The transitions between the
-// states are in server/domain/calibration_life.h.
-enum class CalibrationState {
-  kActive = 1,
-  kSuperseded = 2,
-  kRejected = 3,
-  kCandidate = 4,
-  kRolledBack = 5,
-};
-
 // A check that could not be made is never treated as passed.
 enum class CheckOutcome { kPassed, kFailed, kNotTested };
 
@@ -144,14 +136,6 @@ struct StoredValidation {
   std::int64_t active_version = 0;  // it was validated against this
   std::vector<ValidationCheck> checks;
   HeldOutTest held_out;
-};
-
-enum class VerdictKind {
-  kUnknown,  // not validated yet, or stored before there were verdicts
-  kGood,
-  kWeak,
-  kNotTrustworthy,
-  kFactory,
 };
 
 // The verdict on a version, computed once, when it was validated
@@ -220,26 +204,6 @@ struct StoredEstimate {
   double value = 0;
   std::optional<double> sigma;         // nullopt: not a number
   std::optional<double> from_factory;  // nullopt: of other cameras
-};
-
-// The numbers are those on disk and never change.
-enum class RunState {
-  kPending = 1,
-  kRunning = 2,
-  kSucceeded = 3,
-  kFailed = 4,
-  kCancelled = 5,
-};
-
-// Why a run was created. The numbers are those of
-// selfcal.v1.Recalibration.Trigger and never change.
-enum class RunTrigger {
-  kTablesFull = 1,
-  kTablesChanged = 2,
-  kManual = 3,
-  kChangeDetected = 4,  // the tables are full for the first time since one
-  kCalibrationAged = 5,
-  kSessionEnded = 6,  // and a run is due (server/domain/session_trigger.h)
 };
 
 struct StoredRun {
@@ -455,10 +419,23 @@ class Store {
   // in any order.
   virtual absl::StatusOr<std::vector<StoredCalibration>> GetReports(
       const std::vector<VersionId>& versions) = 0;
-  // Newest first, of one rig or, if `rig` is empty, of those of `of` by their
-  // steady time, without damaged ones. They lack `steps`.
+  // The versions of one rig or, if `rig` is empty, of those of `of` without
+  // damaged ones: newest first unless the query says otherwise, by the steady
+  // time of all rigs for a query without conditions. They lack `steps`.
   virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
-      const std::string& rig, const Page& page, const RigQuery& of = {}) = 0;
+      const std::string& rig,
+      const CalibrationQuery& query,
+      const Page& page,
+      const RigQuery& of = {},
+      CalibrationParts parts = CalibrationParts::kAll) = 0;
+  absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
+      const std::string& rig, const Page& page, const RigQuery& of = {}) {
+    return ListCalibrations(rig, {}, page, of);
+  }
+  // Versions whose verdict or temperature no list finds, as an earlier program
+  // has written them.
+  virtual absl::StatusOr<std::vector<VersionId>> ListIncompleteVersions(
+      int limit) = 0;
   // Parameters of versions, of all rigs of the query, in the order of keys of
   // rigs, versions and components. NOT_FOUND for the name of no rig.
   virtual absl::StatusOr<Listed<StoredEstimate>> ListEstimates(
@@ -474,10 +451,18 @@ class Store {
   // --- Runs.
   virtual absl::StatusOr<StoredRun> GetRun(const std::string& rig,
                                            std::int64_t run) = 0;
-  // Newest first, of one rig or, if `rig` is empty, of those of `of` by their
-  // steady time.
+  // The runs of one rig or, if `rig` is empty, of those of `of`, in the order
+  // of ListCalibrations.
   virtual absl::StatusOr<Listed<StoredRun>> ListRuns(
-      const std::string& rig, const Page& page, const RigQuery& of = {}) = 0;
+      const std::string& rig,
+      const RunQuery& query,
+      const Page& page,
+      const RigQuery& of = {}) = 0;
+  absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
+                                             const Page& page,
+                                             const RigQuery& of = {}) {
+    return ListRuns(rig, {}, page, of);
+  }
   // Pending and running runs of the rigs that no device reports, or of those
   // that a replica has claimed, oldest first. After a restart, a running one
   // starts again.

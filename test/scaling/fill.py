@@ -50,6 +50,8 @@ _OWN = {
     "calibrations": {
         "content": f"overlay(t.content placing {_NAME})",
         "sha256": f"sha256(overlay(t.content placing {_NAME}))",
+        "temperature_c": "CASE WHEN t.run IS NOT NULL "
+        "THEN 10 + 40 * random() END",
     },
     "validations": {
         "content": f"overlay(t.content placing {_NAME})",
@@ -124,7 +126,8 @@ def _choose_rigs(cursor, rigs: int, segments: int) -> None:
 def _columns(cursor, table: str) -> list[str]:
     cursor.execute(
         "SELECT column_name FROM information_schema.columns "
-        "WHERE table_schema = 'public' AND table_name = %s",
+        "WHERE table_schema = 'public' AND table_name = %s "
+        "AND is_generated = 'NEVER'",
         (table,),
     )
     return [name for (name,) in cursor]
@@ -331,6 +334,12 @@ def _raise_alarms(cursor) -> None:
         "INSERT INTO change_groups (rig, change, group_name) "
         "SELECT c.rig, 1, min(t.group_name) FROM changes c "
         "JOIN tables t USING (rig) GROUP BY c.rig"
+    )
+    # As the trigger does, which is off.
+    cursor.execute(
+        "UPDATE calibrations c SET verdict = s.kind FROM shown_verdicts s "
+        "WHERE s.rig = c.rig AND s.version = c.version "
+        "AND c.rig IN (SELECT rig FROM changes)"
     )
     cursor.execute(
         "UPDATE rigs SET alarms = alarms "

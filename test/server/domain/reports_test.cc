@@ -1,7 +1,9 @@
 // Reports of a device to its hub: the hub has what the device has, whatever is
 // lost on the way; a rig that is reported belongs to its device.
 #include <cmath>
+#include <map>
 #include <random>
+#include <vector>
 
 #include "selfcal/store/report.pb.h"
 #include "server/store/change_rows.h"
@@ -244,6 +246,83 @@ TEST_P(ReportsTest, DeviceChangesAreReported) {
   const auto reported = store_->GetChange("a", 1);
   ASSERT_TRUE(reported.ok()) << reported.status();
   EXPECT_EQ(reported->groups, change.groups);
+  ExpectSame("a");
+}
+
+// Lists of the hub find the versions of a device by the verdicts that these
+// have: after each of the records that change one.
+TEST_P(ReportsTest, HubFindsVersionsByTheVerdictsOfTheDevice) {
+  const Rig rig = CreateDeviceRig("a");
+  MotionSegment segment = Segment(0);
+  segment.temperature_c = 21.5;
+  ASSERT_TRUE(device_domain_->PutSegment("a", segment).ok());
+  ScoreOnDevice(rig, 0, 1.0);
+  using Lists = std::map<VerdictKind, std::vector<std::int64_t>>;
+  const auto lists = [](Store* store) {
+    Lists found;
+    CalibrationQuery query;
+    for (const VerdictKind kind : {VerdictKind::kUnknown,
+                                   VerdictKind::kGood,
+                                   VerdictKind::kWeak,
+                                   VerdictKind::kNotTrustworthy,
+                                   VerdictKind::kFactory}) {
+      query.verdict = kind;
+      const auto listed = store->ListCalibrations("", query, {});
+      EXPECT_TRUE(listed.ok()) << listed.status();
+      for (const StoredCalibration& version : listed->items) {
+        found[kind].push_back(version.version);
+      }
+    }
+    return found;
+  };
+  const auto expect = [&](const Lists& expected) {
+    EXPECT_EQ(lists(device_.get()), expected);
+    ReportAll();
+    EXPECT_EQ(lists(store_.get()), expected);
+  };
+  const auto finish = [&](std::int64_t run, CalibrationState state) {
+    StoredCalibration result = TestCalibration(rig, *device_->GetRun("a", run));
+    result.state = state;
+    result.verdict.kind = VerdictKind::kGood;
+    ASSERT_TRUE(device_domain_->FinishRun("a", run, result).ok());
+  };
+  StoreCandidateOnDevice(rig);
+  expect({{VerdictKind::kFactory, {1}}, {VerdictKind::kUnknown, {2}}});
+  finish(1, CalibrationState::kActive);
+  expect({{VerdictKind::kFactory, {1}}, {VerdictKind::kGood, {2}}});
+  ASSERT_TRUE(device_domain_->CreateManualRun("a", true).ok());
+  ASSERT_TRUE(device_domain_->BeginRun("a", 2).ok());
+  finish(2, CalibrationState::kRejected);
+  expect({{VerdictKind::kFactory, {1}},
+          {VerdictKind::kGood, {2}},
+          {VerdictKind::kNotTrustworthy, {3}}});
+  StoredChange change;
+  change.rig = "a";
+  change.change = 1;
+  change.time_ns = 5;
+  change.base_version = 1;
+  change.first_sequence = 1;
+  ASSERT_TRUE(
+      device_
+          ->Transact(
+              "a", 1, [&](UnitOfWork* tx) { return InsertChange(tx, change); })
+          .ok());
+  expect(
+      {{VerdictKind::kFactory, {1}}, {VerdictKind::kNotTrustworthy, {3, 2}}});
+  ASSERT_TRUE(device_domain_->ActivateCalibration("a", 1, "eve", "x").ok());
+  expect({{VerdictKind::kFactory, {1}},
+          {VerdictKind::kGood, {2}},
+          {VerdictKind::kNotTrustworthy, {3}}});
+  ASSERT_TRUE(device_domain_->ReportDisagreement("a", 2, "by 3 sigma").ok());
+  expect(
+      {{VerdictKind::kFactory, {1}}, {VerdictKind::kNotTrustworthy, {3, 2}}});
+
+  CalibrationQuery warm;
+  warm.order = CalibrationQuery::Order::kTemperature;
+  warm.temperature_c = {21.5, 21.5};
+  const auto of_hub = store_->ListCalibrations("", warm, {});
+  ASSERT_TRUE(of_hub.ok()) << of_hub.status();
+  EXPECT_THAT(of_hub->items, SizeIs(2));
   ExpectSame("a");
 }
 

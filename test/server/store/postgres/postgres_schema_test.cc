@@ -104,7 +104,8 @@ TEST_F(PostgresSchemaTest, EveryTransitionThatIsNotInTheTableIsRefused) {
 TEST_F(PostgresSchemaTest, OnlyCandidatesAndTheFactorysBegin) {
   for (const CalibrationState state : kStates) {
     const std::string sql =
-        "INSERT INTO calibrations SELECT rig, 9, " +
+        "INSERT INTO calibrations (rig, version, state, create_time_ns, run, "
+        "  content, sha256, create_steady_ns) SELECT rig, 9, " +
         std::to_string(static_cast<int>(state)) +
         ", create_time_ns, run, content, sha256, create_steady_ns "
         "FROM calibrations WHERE version = 1";

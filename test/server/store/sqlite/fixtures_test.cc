@@ -91,6 +91,22 @@ class FixturesTest : public SqliteTest {
     }
   }
 
+  // Verdicts and temperatures by which lists find versions, which databases
+  // from before schema version 25 get later.
+  void ExpectListColumns(bool kept) {
+    const auto written = domain_->CompleteVersions(100);
+    ASSERT_TRUE(written.ok()) << written.status();
+    EXPECT_EQ(*written, kept ? 0 : 2);
+    CalibrationQuery query;
+    query.verdict = VerdictKind::kFactory;
+    const auto listed = store_->ListCalibrations("", query, {});
+    ASSERT_TRUE(listed.ok()) << listed.status();
+    ASSERT_EQ(listed->items.size(), 1u);
+    EXPECT_EQ(listed->items.front().version, 1);
+    query.verdict = store_->GetCalibration("a", 2)->verdict.kind;
+    EXPECT_EQ(store_->ListCalibrations("", query, {})->items.size(), 1u);
+  }
+
   static std::int64_t Version(const std::string& path) {
     return ReadIntInFile(path, "PRAGMA user_version").value_or(-1);
   }
@@ -133,6 +149,7 @@ TEST_F(FixturesTest, EverySchemaThatWasReleasedOpensWithAllItHeld) {
     ExpectFixture(store_.get());
     ExpectMotion(version >= 7);
     ExpectEstimates(version >= 16);
+    ExpectListColumns(version >= 25);
     // And works on.
     MotionSegment segment = FixtureSegments()[0];
     segment.key = {"later", 0};

@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 24u);
+  ASSERT_EQ(migrations.size(), 25u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -143,6 +143,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[23].name, "0024_segments_over_rigs.sql");
   EXPECT_EQ(migrations[23].sha256,
             "c8e0e34d3debc3190e74daceda7847e2ba51b9ea1e7bbac8ba88f1414b3ea858");
+  EXPECT_EQ(migrations[24].name, "0025_versions_and_runs.sql");
+  EXPECT_EQ(migrations[24].sha256,
+            "99c89be4985fc2a9a8616d05ed46c8366abcda123aee20b33eeca480de7fc1df");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

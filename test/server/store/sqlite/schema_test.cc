@@ -56,6 +56,11 @@ TEST(NumbersOnDisk, OfStatesAndTriggersNeverChange) {
                              {RunTrigger::kChangeDetected, 4},
                              {RunTrigger::kCalibrationAged, 5},
                              {RunTrigger::kSessionEnded, 6}});
+  ExpectNumbers<VerdictKind>({{VerdictKind::kUnknown, 0},
+                              {VerdictKind::kGood, 1},
+                              {VerdictKind::kWeak, 2},
+                              {VerdictKind::kNotTrustworthy, 3},
+                              {VerdictKind::kFactory, 4}});
   ExpectNumbers<InstructionState>({{InstructionState::kPending, 1},
                                    {InstructionState::kDone, 2},
                                    {InstructionState::kRefused, 3}});
@@ -129,6 +134,9 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
       "ended_reports",
       // The hub has its own key, and derives the rest from what is reported.
       "estimates",
+      "calibrations.validated",
+      "calibrations.verdict",
+      "calibrations.temperature_c",
       "rig_name_suffixes",
       "table_absences.steady_ns",
       "rigs.alarms",
@@ -219,7 +227,8 @@ TEST_F(SchemaTest, DatabaseLetsOnlyCandidatesAndTheFactorysBegin) {
   store_.reset();
   for (const CalibrationState state : kStates) {
     const std::string sql =
-        "INSERT INTO calibrations SELECT rig, 9, " +
+        "INSERT INTO calibrations (rig, version, state, create_time_ns, run, "
+        "  content, sha256, create_steady_ns) SELECT rig, 9, " +
         std::to_string(static_cast<int>(state)) +
         ", create_time_ns, run, content, sha256, create_steady_ns "
         "FROM calibrations";
@@ -302,6 +311,40 @@ TEST_F(SchemaTest, StatementsReadTheRowsThatTheyNeed) {
        "ORDER BY r.create_steady_ns DESC, r.rig DESC, r.run DESC LIMIT 10",
        {"SEARCH r USING COVERING INDEX runs_by_time "
         "((create_steady_ns,rig,run)<(?,?,?))",
+        "SEARCH g USING INTEGER PRIMARY KEY (rowid=?)"}},
+      {"SELECT c.rig, c.version FROM calibrations c "
+       "JOIN rigs g ON g.rig = c.rig WHERE c.state = 3 "
+       "AND (c.create_time_ns, c.rig, c.version) < (1, 1, 1) "
+       "ORDER BY c.create_time_ns DESC, c.rig DESC, c.version DESC LIMIT 10",
+       {"SEARCH c USING COVERING INDEX calibrations_by_state "
+        "(state=? AND (create_time_ns,rig,version)<(?,?,?))",
+        "SEARCH g USING INTEGER PRIMARY KEY (rowid=?)"}},
+      {"SELECT c.rig, c.version FROM calibrations c "
+       "JOIN rigs g ON g.rig = c.rig "
+       "WHERE c.verdict = 3 AND c.create_time_ns >= 1 "
+       "ORDER BY c.create_time_ns DESC, c.rig DESC, c.version DESC LIMIT 10",
+       {"SEARCH c USING COVERING INDEX calibrations_by_verdict "
+        "(verdict=? AND create_time_ns>?)",
+        "SEARCH g USING INTEGER PRIMARY KEY (rowid=?)"}},
+      {"SELECT c.rig, c.version FROM calibrations c "
+       "JOIN rigs g ON g.rig = c.rig "
+       "WHERE c.temperature_c >= 10.0 AND c.temperature_c <= 20.0 "
+       "AND c.temperature_c IS NOT NULL "
+       "ORDER BY c.temperature_c ASC, c.rig ASC, c.version ASC LIMIT 10",
+       {"SEARCH c USING COVERING INDEX calibrations_by_temperature "
+        "(temperature_c>? AND temperature_c<?)",
+        "SEARCH g USING INTEGER PRIMARY KEY (rowid=?)"}},
+      {"SELECT r.message FROM runs r JOIN rigs g USING (rig) "
+       "WHERE r.started_by = 5 "
+       "ORDER BY r.create_time_ns DESC, r.rig DESC, r.run DESC LIMIT 10",
+       {"SEARCH r USING INDEX runs_by_trigger (started_by=?)",
+        "SEARCH g USING INTEGER PRIMARY KEY (rowid=?)"}},
+      {"SELECT r.message FROM runs r JOIN rigs g USING (rig) "
+       "WHERE r.duration_ns IS NOT NULL "
+       "AND (r.duration_ns, r.rig, r.run) < (1, 1, 1) "
+       "ORDER BY r.duration_ns DESC, r.rig DESC, r.run DESC LIMIT 10",
+       {"SEARCH r USING INDEX runs_by_duration "
+        "(duration_ns>? AND (duration_ns,rig,run)<(?,?,?))",
         "SEARCH g USING INTEGER PRIMARY KEY (rowid=?)"}},
       {"SELECT id FROM rigs WHERE (alarms, id) < (1, 'a') AND alarms > 0 "
        "ORDER BY alarms DESC, id DESC LIMIT 10",

@@ -1,0 +1,44 @@
+// The order of a list by columns, and the places in it where its pages begin.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/store/driver/sql_condition.h"
+#include "server/store/driver/statement.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+struct RowOrder {
+  // All of them together are different for each row.
+  std::vector<std::string> columns;
+  bool is_real = false;  // the first column; all others are whole numbers
+  bool descending = true;
+};
+
+// The values of the columns in the row after which a page begins; none: the
+// page is the first.
+using RowPlace = std::vector<SqlCondition::Value>;
+
+// INVALID_ARGUMENT for a token of another list.
+absl::StatusOr<RowPlace> RowPlaceOf(std::string_view list,
+                                    const RowOrder& order,
+                                    const Page& page);
+// The token of a page after this place.
+std::string TokenAfter(std::string_view list, const RowPlace& place);
+
+// The place of a row whose columns of the order begin at this one.
+RowPlace PlaceOfRow(const RowOrder& order,
+                    const Statement& row,
+                    int first_column);
+
+// The condition that a row follows the place, if there is one.
+void AndAfter(const RowOrder& order, const RowPlace& place, SqlCondition* to);
+// What follows ORDER BY.
+std::string OrderText(const RowOrder& order);
+
+}  // namespace selfcal::server
