@@ -1,3 +1,4 @@
+#include <functional>
 #include <map>
 #include <set>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "server/api/paging.h"
 #include "server/api/read_version.h"
 #include "server/api/version_updates.h"
+#include "server/encode/calibration_filter.h"
 #include "server/encode/compare.h"
 #include "server/encode/encode.h"
 #include "server/encode/encode_coaching.h"
@@ -137,22 +139,54 @@ absl::Status VerifyRig(const ApiContext& context,
   return absl::OkStatus();
 }
 
-// ListCalibrationsRequest::BASIC.
-void LeaveOutDetails(v1::Calibration* calibration) {
-  calibration->clear_covariance();
-  calibration->clear_estimates();
-  if (calibration->has_provenance()) {
-    calibration->mutable_provenance()->clear_settings();
-  }
-  if (calibration->has_solver()) {
-    calibration->mutable_solver()->clear_segment_fits();
-  }
-}
-
 // A covariance of 45 components is 17 kB in JSON: a page of so many versions is
 // answered in 19 ms, one of 50 without the details in 24 (docs/fleet.md,
 // Lists).
 constexpr int kMaxDetailedVersions = 15;
+
+using ListVersions = std::function<absl::StatusOr<Listed<StoredCalibration>>(
+    const Page& page, CalibrationParts parts)>;
+
+// ListCalibrationsRequest::BASIC. The definitions of the rigs are not needed.
+absl::StatusOr<v1::ListCalibrationsResponse> ListSummaries(
+    const v1::ListCalibrationsRequest& request, const ListVersions& list) {
+  return FillPage<v1::ListCalibrationsResponse>(
+      request,
+      request.parent(),
+      [&](const Page& page) { return list(page, CalibrationParts::kSummary); },
+      [](const StoredCalibration& calibration,
+         v1::ListCalibrationsResponse* to) {
+        *to->add_calibrations() = EncodeSummary(calibration);
+        return absl::OkStatus();
+      });
+}
+
+absl::StatusOr<v1::ListCalibrationsResponse> ListWithDetails(
+    Store* store,
+    const v1::ListCalibrationsRequest& request,
+    const ListVersions& list) {
+  std::map<std::string, StoredRig> rigs;
+  return FillPage<v1::ListCalibrationsResponse>(
+      request,
+      request.parent(),
+      [&](const Page& page) -> absl::StatusOr<Listed<StoredCalibration>> {
+        SELFCAL_ASSIGN_OR_RETURN(Listed<StoredCalibration> listed,
+                                 list(page, CalibrationParts::kAll));
+        std::set<std::string> names;
+        for (const auto& item : listed.items) names.insert(item.rig);
+        SELFCAL_ASSIGN_OR_RETURN(rigs, store->GetRigs(names));
+        return listed;
+      },
+      [&](const StoredCalibration& calibration,
+          v1::ListCalibrationsResponse* to) {
+        // A rig may be deleted meanwhile.
+        const auto rig = rigs.find(calibration.rig);
+        if (rig == rigs.end()) return absl::OkStatus();
+        *to->add_calibrations() = Encode(calibration, rig->second);
+        return absl::OkStatus();
+      },
+      kMaxDetailedVersions);
+}
 
 absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
     const ApiContext& context,
@@ -161,31 +195,23 @@ absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
   SELFCAL_ASSIGN_OR_RETURN(
       const ListParent parent,
       ReadListParent(call, request.parent(), request.rig_filter()));
-  const bool basic = request.view() == v1::ListCalibrationsRequest::BASIC;
-  std::map<std::string, StoredRig> rigs;
-  return FillPage<v1::ListCalibrationsResponse>(
-      request,
-      request.parent(),
-      [&](const Page& page) -> absl::StatusOr<Listed<StoredCalibration>> {
-        SELFCAL_ASSIGN_OR_RETURN(
-            Listed<StoredCalibration> listed,
-            context.store->ListCalibrations(parent.rig, page, parent.of));
-        std::set<std::string> names;
-        for (const auto& item : listed.items) names.insert(item.rig);
-        SELFCAL_ASSIGN_OR_RETURN(rigs, context.store->GetRigs(names));
-        return listed;
-      },
-      [&](const StoredCalibration& calibration,
-          v1::ListCalibrationsResponse* to) {
-        // A rig may be deleted meanwhile.
-        const auto rig = rigs.find(calibration.rig);
-        if (rig == rigs.end()) return absl::OkStatus();
-        v1::Calibration* added = to->add_calibrations();
-        *added = Encode(calibration, rig->second);
-        if (basic) LeaveOutDetails(added);
-        return absl::OkStatus();
-      },
-      basic ? kMaxPageSize : kMaxDetailedVersions);
+  CalibrationQuery query;
+  if (const auto filter = ParseCalibrationFilter(request.filter(), &query);
+      !filter.ok()) {
+    return About(filter, {kCalibrationType, "", "filter"});
+  }
+  if (const auto order = ParseCalibrationOrder(request.order_by(), &query);
+      !order.ok()) {
+    return About(order, {kCalibrationType, "", "order_by"});
+  }
+  const auto list = [&](const Page& page, CalibrationParts parts) {
+    return context.store->ListCalibrations(
+        parent.rig, query, page, parent.of, parts);
+  };
+  if (request.view() == v1::ListCalibrationsRequest::BASIC) {
+    return ListSummaries(request, list);
+  }
+  return ListWithDetails(context.store, request, list);
 }
 
 absl::StatusOr<std::shared_ptr<void>> WatchCalibration(

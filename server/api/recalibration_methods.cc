@@ -9,6 +9,7 @@
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/encode/encode.h"
+#include "server/encode/run_filter.h"
 #include "server/encode/versions.h"
 #include "server/status/status_macros.h"
 
@@ -81,6 +82,15 @@ absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
   SELFCAL_ASSIGN_OR_RETURN(
       const ListParent parent,
       ReadListParent(call, request.parent(), request.rig_filter()));
+  RunQuery query;
+  if (const auto filter = ParseRunFilter(request.filter(), &query);
+      !filter.ok()) {
+    return About(filter, {kRunType, "", "filter"});
+  }
+  if (const auto order = ParseRunOrder(request.order_by(), &query);
+      !order.ok()) {
+    return About(order, {kRunType, "", "order_by"});
+  }
   std::map<VersionId, StoredCalibration> reports;
   return FillPage<v1::ListRecalibrationsResponse>(
       request,
@@ -88,7 +98,7 @@ absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
       [&](const Page& page) -> absl::StatusOr<Listed<StoredRun>> {
         SELFCAL_ASSIGN_OR_RETURN(
             Listed<StoredRun> listed,
-            context.store->ListRuns(parent.rig, page, parent.of));
+            context.store->ListRuns(parent.rig, query, page, parent.of));
         SELFCAL_ASSIGN_OR_RETURN(reports,
                                  ReportsOf(context.store, listed.items));
         return listed;

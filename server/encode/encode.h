@@ -21,6 +21,8 @@ v1::Table Encode(const std::string& rig, const Table& table);
 
 v1::Calibration::State EncodeCalibrationState(CalibrationState state);
 
+// Encodes all of a calibration but its estimates and their covariance.
+v1::Calibration EncodeSummary(const StoredCalibration& calibration);
 // Encodes a calibration with an estimate for each tangent component: its value,
 // its difference from the factory value, its sigma from the covariance, and the
 // random walk density that the rig states.

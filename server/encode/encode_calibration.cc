@@ -84,8 +84,7 @@ void FillProvenance(const StoredCalibration& calibration,
 
 }  // namespace
 
-v1::Calibration Encode(const StoredCalibration& calibration,
-                       const StoredRig& rig) {
+v1::Calibration EncodeSummary(const StoredCalibration& calibration) {
   v1::Calibration message;
   message.set_name(ChildName(
       calibration.rig, "calibrations", std::to_string(calibration.version)));
@@ -93,7 +92,6 @@ v1::Calibration Encode(const StoredCalibration& calibration,
   message.set_state(EncodeCalibrationState(calibration.state));
   SetTime(calibration.create_time_ns, message.mutable_create_time());
   *message.mutable_parameters() = ToProto(calibration.theta);
-  FillEstimates(calibration, rig, &message);
   if (HasSlopes(calibration.theta)) {
     message.set_temperature_c(calibration.theta.reference_temperature_c);
   }
@@ -114,6 +112,13 @@ v1::Calibration Encode(const StoredCalibration& calibration,
   const Verdict verdict = VerdictOf(calibration);
   *message.mutable_verdict() = VerdictMessage(verdict);
   message.mutable_verdict()->set_text(VerdictText(verdict.kind));
+  return message;
+}
+
+v1::Calibration Encode(const StoredCalibration& calibration,
+                       const StoredRig& rig) {
+  v1::Calibration message = EncodeSummary(calibration);
+  FillEstimates(calibration, rig, &message);
   return message;
 }
 

@@ -2,75 +2,19 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <google/protobuf/util/time_util.h>
 
-#include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <cstdint>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "proto/safe_text.h"
 #include "selfcal/v1/segment.pb.h"
 #include "server/encode/filter_terms.h"
+#include "server/encode/filter_values.h"
 #include "server/status/status_macros.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 namespace {
-
-std::int64_t Next(std::int64_t value) { return value + (value != INT64_MAX); }
-std::int64_t Before(std::int64_t value) { return value - (value != INT64_MIN); }
-double Next(double value) {
-  return std::nextafter(value, std::numeric_limits<double>::infinity());
-}
-double Before(double value) {
-  return std::nextafter(value, -std::numeric_limits<double>::infinity());
-}
-
-// Narrows the range by a condition; several conditions on a field all apply.
-template <typename T>
-void Narrow(const std::string& sign, T value, Range<T>* range) {
-  if (sign != "<" && sign != "<=") {
-    const T least = sign == ">" ? Next(value) : value;
-    range->least = std::max(range->least.value_or(least), least);
-  }
-  if (sign != ">" && sign != ">=") {
-    const T most = sign == "<" ? Before(value) : value;
-    range->most = std::min(range->most.value_or(most), most);
-  }
-}
-
-template <typename T>
-absl::Status NarrowByNumber(const FilterTerm& term, Range<T>* range) {
-  T value = 0;
-  const char* const end = term.value.data() + term.value.size();
-  const auto parsed = std::from_chars(term.value.data(), end, value);
-  const bool finite = std::isfinite(static_cast<double>(value));
-  if (parsed.ec != std::errc() || parsed.ptr != end || !finite) {
-    return NotWhatIsExpected(
-        term.value, std::is_integral_v<T> ? "a whole number" : "a number");
-  }
-  Narrow(term.sign, value, range);
-  return absl::OkStatus();
-}
-
-absl::Status NarrowByTime(const FilterTerm& term, Range<std::int64_t>* range) {
-  google::protobuf::Timestamp time;
-  if (!google::protobuf::util::TimeUtil::FromString(term.value, &time)) {
-    return NotWhatIsExpected(term.value, "a time as 2026-11-21T04:10:03Z");
-  }
-  // Times in other years do not fit into 64 bits.
-  if (time.seconds() < 0 || time.seconds() > INT64_MAX / 1'000'000'000 - 1) {
-    return NotWhatIsExpected(term.value, "a time from 1970 to 2262");
-  }
-  Narrow(term.sign,
-         google::protobuf::util::TimeUtil::TimestampToNanoseconds(time),
-         range);
-  return absl::OkStatus();
-}
 
 absl::Status NarrowByScore(const FilterTerm& term, SegmentQuery* query) {
   if (term.group.empty()) {
@@ -88,20 +32,6 @@ absl::Status NarrowByScore(const FilterTerm& term, SegmentQuery* query) {
   query->scored_group = term.group;
   return NarrowByNumber(
       term, term.field == "gain" ? &query->gain_nats : &query->entropy_nats);
-}
-
-absl::Status ReadState(const FilterTerm& term,
-                       std::optional<SegmentState>* state) {
-  if (term.value == "STORED") {
-    *state = SegmentState::kStored;
-  } else if (term.value == "SCORED") {
-    *state = SegmentState::kScored;
-  } else if (term.value == "UNUSABLE") {
-    *state = SegmentState::kUnusable;
-  } else {
-    return NotWhatIsExpected(term.value, "a state: STORED, SCORED or UNUSABLE");
-  }
-  return absl::OkStatus();
 }
 
 absl::Status ReadBool(const FilterTerm& term, std::optional<bool>* value) {
@@ -132,11 +62,15 @@ absl::Status ReadCause(const FilterTerm& term,
 
 // Applies a condition on a field that supports only '='.
 absl::Status ApplyEquality(const FilterTerm& term, SegmentQuery* query) {
-  if (term.sign != "=") {
-    return NotWhatIsExpected(term.sign,
-                             fmt::format("= : {} has no order", term.field));
+  SELFCAL_RETURN_IF_ERROR(CheckEquality(term));
+  if (term.field == "state") {
+    return ReadWord(term,
+                    "a state",
+                    {{"STORED", SegmentState::kStored},
+                     {"SCORED", SegmentState::kScored},
+                     {"UNUSABLE", SegmentState::kUnusable}},
+                    &query->state);
   }
-  if (term.field == "state") return ReadState(term, &query->state);
   if (term.field == "has_data") return ReadBool(term, &query->has_data);
   if (term.field == "excluded") return ReadCause(term, &query->excluded);
   if (term.field == "session") {

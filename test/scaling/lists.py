@@ -211,6 +211,78 @@ def _fleet_wide(of: Fleet, size: int) -> list[Request]:
             True,
         ),
         Request("runs", page("recalibrations"), "recalibrations", True),
+        Request(
+            "calibrations, rejected",
+            page("calibrations", view="BASIC", filter="state = REJECTED"),
+        ),
+        Request(
+            "calibrations, not trustworthy",
+            page(
+                "calibrations",
+                view="BASIC",
+                filter="verdict = NOT_TRUSTWORTHY",
+            ),
+            "calibrations",
+            True,
+        ),
+        Request(
+            "calibrations, not trustworthy, of a model",
+            page(
+                "calibrations",
+                view="BASIC",
+                filter="verdict = NOT_TRUSTWORTHY",
+                rig_filter=model,
+            ),
+        ),
+        Request(
+            "calibrations by temperature",
+            page("calibrations", view="BASIC", order_by="temperature_c desc"),
+            "calibrations",
+            True,
+        ),
+        Request(
+            "calibrations by temperature, of a range",
+            page(
+                "calibrations",
+                view="BASIC",
+                filter="temperature_c >= 20 AND temperature_c <= 21",
+                order_by="temperature_c asc",
+            ),
+            "calibrations",
+            True,
+        ),
+        Request(
+            "runs, failed",
+            page("recalibrations", filter="state = FAILED"),
+            "recalibrations",
+            True,
+        ),
+        Request(
+            "runs, failed, of a model",
+            page(
+                "recalibrations", filter="state = FAILED", rig_filter=model
+            ),
+        ),
+        Request(
+            "runs, started by age",
+            page("recalibrations", filter="trigger = CALIBRATION_AGED"),
+        ),
+        Request(
+            "runs by duration",
+            page("recalibrations", order_by="duration desc"),
+            "recalibrations",
+            True,
+        ),
+        Request(
+            "runs by duration, of a model",
+            page(
+                "recalibrations",
+                order_by="duration desc",
+                rig_filter=model,
+            ),
+            "recalibrations",
+            True,
+        ),
         Request("events, oldest first", page("events"), "events", True),
         Request(
             "events, newest first",

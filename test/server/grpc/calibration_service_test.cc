@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/model/so3.h"
 #include "server/encode/compare.h"
@@ -249,6 +251,59 @@ TEST_F(CalibrationServiceTest, APageHasFewerVersionsWithDetails) {
   request.set_view(v1::ListCalibrationsRequest::BASIC);
   ASSERT_TRUE(calibrations_->ListCalibrations(&context, request, &page).ok());
   EXPECT_EQ(page.calibrations_size(), 17);
+}
+
+// The filter finds a version by the verdict that the list shows, also after a
+// finding.
+TEST_F(CalibrationServiceTest, AFilterMeetsTheVerdictThatIsShown) {
+  AddCalibrated();
+  const auto expect_shown = [&](const std::vector<v1::Verdict::Kind>& newest) {
+    v1::ListCalibrationsResponse all;
+    ASSERT_TRUE(List("rigs/r", 0, "", &all).ok());
+    std::vector<v1::Verdict::Kind> shown;
+    for (const auto& version : all.calibrations()) {
+      shown.push_back(version.verdict().kind());
+    }
+    EXPECT_EQ(shown, newest);
+    for (int kind = 0; kind < v1::Verdict::Kind_ARRAYSIZE; ++kind) {
+      const auto wanted = static_cast<v1::Verdict::Kind>(kind);
+      Context context;
+      v1::ListCalibrationsRequest request;
+      request.set_filter("verdict = " + v1::Verdict::Kind_Name(wanted));
+      request.set_order_by("create_time asc");
+      v1::ListCalibrationsResponse found;
+      ASSERT_TRUE(
+          calibrations_->ListCalibrations(&context, request, &found).ok());
+      EXPECT_EQ(found.calibrations_size(),
+                std::count(newest.begin(), newest.end(), wanted));
+      for (const auto& version : found.calibrations()) {
+        EXPECT_EQ(version.verdict().kind(), wanted);
+      }
+    }
+  };
+  expect_shown({v1::Verdict::UNKNOWN, v1::Verdict::FACTORY});
+  ASSERT_TRUE(domain_->ReportDisagreement("r", 2, "by 3 sigma").ok());
+  expect_shown({v1::Verdict::NOT_TRUSTWORTHY, v1::Verdict::FACTORY});
+}
+
+TEST_F(CalibrationServiceTest, AFaultyFilterOrOrderIsRefused) {
+  AddRig();
+  v1::ListCalibrationsResponse page;
+  for (const std::string parent : {"", "rigs/r"}) {
+    v1::ListCalibrationsRequest request;
+    request.set_parent(parent);
+    request.set_filter("verdict = bad");
+    Context first;
+    EXPECT_THAT(
+        BadFields(calibrations_->ListCalibrations(&first, request, &page)),
+        ElementsAre("filter"));
+    request.clear_filter();
+    request.set_order_by("verdict");
+    Context second;
+    EXPECT_THAT(
+        BadFields(calibrations_->ListCalibrations(&second, request, &page)),
+        ElementsAre("order_by"));
+  }
 }
 
 TEST_F(CalibrationServiceTest, ListOfAnUnknownRigOrPageIsRefused) {

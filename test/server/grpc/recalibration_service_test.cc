@@ -127,6 +127,49 @@ TEST_F(RecalibrationServiceTest, PagesHoldEveryRunNewestFirst) {
   EXPECT_EQ(page.recalibrations(0).solver().iterations(), 7);
 }
 
+TEST_F(RecalibrationServiceTest, RunsAreFilteredAndSorted) {
+  const Rig rig = AddScored(1);
+  v1::Recalibration run;
+  ASSERT_TRUE(Start("rigs/r", &run).ok());
+  FinishRun(rig, 1);
+  ASSERT_TRUE(Start("rigs/r", &run, true).ok());
+  const auto list = [&](const std::string& filter, const std::string& order) {
+    Context context;
+    v1::ListRecalibrationsRequest request;
+    request.set_filter(filter);
+    request.set_order_by(order);
+    v1::ListRecalibrationsResponse page;
+    const grpc::Status status =
+        recalibrations_->ListRecalibrations(&context, request, &page);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    std::vector<std::string> names;
+    for (const auto& one : page.recalibrations()) names.push_back(one.name());
+    return names;
+  };
+  EXPECT_THAT(list("state = PENDING", ""),
+              ElementsAre("rigs/r/recalibrations/2"));
+  EXPECT_THAT(list("state = SUCCEEDED AND trigger = MANUAL", ""),
+              ElementsAre("rigs/r/recalibrations/1"));
+  EXPECT_THAT(list("trigger = TABLES_FULL", ""), ElementsAre());
+  EXPECT_THAT(
+      list("", "create_time asc"),
+      ElementsAre("rigs/r/recalibrations/1", "rigs/r/recalibrations/2"));
+  EXPECT_THAT(list("", "duration"), ElementsAre("rigs/r/recalibrations/1"));
+  v1::ListRecalibrationsRequest request;
+  v1::ListRecalibrationsResponse page;
+  request.set_filter("state = pending");
+  Context first;
+  EXPECT_THAT(
+      BadFields(recalibrations_->ListRecalibrations(&first, request, &page)),
+      ElementsAre("filter"));
+  request.clear_filter();
+  request.set_order_by("state");
+  Context second;
+  EXPECT_THAT(
+      BadFields(recalibrations_->ListRecalibrations(&second, request, &page)),
+      ElementsAre("order_by"));
+}
+
 TEST_F(RecalibrationServiceTest, UnchangedTablesHaveToBeForced) {
   const Rig rig = AddScored(1);
   v1::Recalibration run;
