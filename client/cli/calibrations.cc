@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -28,15 +29,25 @@ std::vector<FilterField> CalibrationFields() {
           {"state",
            Kind::kText,
            WordsOf<v1::Calibration::State>(v1::Calibration::State_descriptor(),
-                                           StateText)},
-          {"created", Kind::kTime},
-          {"verdict"}};
+                                           StateText),
+           "state"},
+          {"created", Kind::kTime, {}, "create_time"},
+          {"verdict",
+           Kind::kText,
+           {"good", "weak", "not-trustworthy", "factory", "unknown"},
+           "verdict"},
+          {"temperature_c", Kind::kNumber, {}, "temperature_c"}};
 }
 
 FieldValue ValueOf(const v1::Calibration& calibration, std::string_view field) {
   if (field == "state") return StateText(calibration.state());
   if (field == "created") return FilterTime(calibration.create_time());
   if (field == "verdict") return VerdictText(calibration);
+  if (field == "temperature_c") {
+    return calibration.provenance().has_temperature()
+               ? calibration.provenance().temperature().mean_c()
+               : std::numeric_limits<double>::quiet_NaN();
+  }
   return static_cast<double>(calibration.version());
 }
 
@@ -50,6 +61,8 @@ int ListCalibrations(Context* context,
   v1::ListCalibrationsRequest request;
   if (!rig.empty()) request.set_parent(RigName(rig));
   request.set_rig_filter(options.rigs);
+  request.set_filter(wanted->for_daemon);
+  request.set_order_by(options.order_by);
   if (!context->json && !context->csv) {
     request.set_view(v1::ListCalibrationsRequest::BASIC);
   }
@@ -60,7 +73,7 @@ int ListCalibrations(Context* context,
       request,
       &v1::ListCalibrationsResponse::mutable_calibrations,
       options.limit,
-      *wanted,
+      wanted->test,
       &calibrations);
   if (!status.ok()) return Fail(*context, status);
   if (context->PrintList(calibrations)) return kDone;
@@ -206,9 +219,10 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   AddListOptions(
       list,
       context,
-      "the newest",
+      "the first of the list",
       FilterHelp("state = rejected AND created >= 30d", CalibrationFields()),
       options.get());
+  AddOrderBy(list, ": create_time or temperature_c", options.get());
   AddRigFilter(list, of, options.get());
   list->callback([context, rig, options] {
     context->command = [context, rig, options] {

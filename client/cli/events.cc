@@ -133,12 +133,11 @@ int ListEvents(Context* context, const EventOptions& options) {
     }
     since = *time;
   }
-  const auto meets_filter =
-      Wanted<v1::Event>(options.list, EventFields(), ValueOf);
-  if (!meets_filter.ok()) return FailInput(meets_filter.status());
+  const auto wanted = Wanted<v1::Event>(options.list, EventFields(), ValueOf);
+  if (!wanted.ok()) return FailInput(wanted.status());
   std::deque<v1::Event> events;
   const grpc::Status status =
-      Read(context, options, since, *meets_filter, &events);
+      Read(context, options, since, wanted->test, &events);
   if (!status.ok()) return Fail(*context, status);
   PrintEvents(*context, events);
   return kDone;

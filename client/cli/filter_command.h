@@ -1,11 +1,14 @@
-// The --filter of a list that the daemon does not filter.
+// The --filter of a list whose items the program tests.
 #pragma once
 
 #include <absl/status/statusor.h>
 #include <google/protobuf/util/time_util.h>
 
+#include <algorithm>
 #include <functional>
+#include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "client/cli/list_filter.h"
@@ -13,24 +16,33 @@
 
 namespace selfcal::client {
 
-// Returns whether an item meets the filter, for CallForItems; empty without a
-// filter. The errors are those of ListFilter::Parse.
+// The conditions of a filter.
 template <typename Item>
-absl::StatusOr<std::function<bool(const Item&)>> Wanted(
+struct ItemFilter {
+  // Whether an item meets them, for CallForItems; empty without a filter.
+  std::function<bool(const Item&)> test;
+  std::string for_daemon;  // ListFilter::ForDaemon
+};
+
+// The errors are those of ListFilter::Parse.
+template <typename Item>
+absl::StatusOr<ItemFilter<Item>> Wanted(
     const ListOptions& options,
     const std::vector<FilterField>& fields,
     FieldValue (*value)(const Item& item, std::string_view field)) {
-  using Test = std::function<bool(const Item&)>;
-  if (options.filter.empty()) return Test();
+  if (options.filter.empty()) return ItemFilter<Item>();
   auto filter =
       ListFilter::Parse(options.filter,
                         fields,
                         google::protobuf::util::TimeUtil::GetCurrentTime());
   if (!filter.ok()) return filter.status();
-  return Test([filter = *std::move(filter), value](const Item& item) {
+  ItemFilter<Item> wanted;
+  wanted.for_daemon = filter->ForDaemon();
+  wanted.test = [filter = *std::move(filter), value](const Item& item) {
     return filter.Meets(
         [&item, value](std::string_view field) { return value(item, field); });
-  });
+  };
+  return wanted;
 }
 
 // Returns the words that an enumeration of the contract has, without the

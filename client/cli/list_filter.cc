@@ -2,9 +2,12 @@
 
 #include <absl/strings/numbers.h>
 #include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 
@@ -125,6 +128,27 @@ bool Compare(const T& a, const std::string& sign, const T& b) {
   return sign == ">" ? a > b : a >= b;
 }
 
+// The name of an enumerator: ROLLED_BACK of rolled-back.
+std::string DaemonWord(std::string plain) {
+  for (char& c : plain) {
+    c = c == '-'
+            ? '_'
+            : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  }
+  return plain;
+}
+
+// The whole second before or after the time, so that no item is excluded by
+// rounding; empty for a time that is compared for equality.
+std::string DaemonTime(const std::string& sign, double seconds) {
+  if (sign == "=") return "";
+  const double whole =
+      sign.starts_with("<") ? std::ceil(seconds) : std::floor(seconds);
+  return google::protobuf::util::TimeUtil::ToString(
+      google::protobuf::util::TimeUtil::SecondsToTimestamp(
+          static_cast<std::int64_t>(whole)));
+}
+
 }  // namespace
 
 absl::StatusOr<ListFilter> ListFilter::Parse(
@@ -164,7 +188,11 @@ absl::StatusOr<ListFilter> ListFilter::Parse(
     }
     auto value = ReadValue(*field, word, now);
     if (!value.ok()) return value.status();
-    filter.conditions_.push_back({name, sign, *std::move(value)});
+    filter.conditions_.push_back({name,
+                                  field->of_daemon,
+                                  sign,
+                                  *std::move(value),
+                                  field->kind == FilterField::Kind::kTime});
   }
   return filter;
 }
@@ -181,6 +209,25 @@ bool ListFilter::Meets(
                              one.sign,
                              std::get<std::string>(one.value));
       });
+}
+
+std::string ListFilter::ForDaemon() const {
+  std::vector<std::string> terms;
+  for (const Condition& one : conditions_) {
+    if (one.of_daemon.empty() || one.sign == "!=") continue;
+    const auto* const number = std::get_if<double>(&one.value);
+    std::string value;
+    if (number == nullptr) {
+      value = DaemonWord(std::get<std::string>(one.value));
+    } else if (one.is_time) {
+      value = DaemonTime(one.sign, *number);
+    } else {
+      value = fmt::format("{}", *number);
+    }
+    if (value.empty()) continue;
+    terms.push_back(fmt::format("{} {} {}", one.of_daemon, one.sign, value));
+  }
+  return fmt::format("{}", fmt::join(terms, " AND "));
 }
 
 std::string FilterHelp(const std::string& example,

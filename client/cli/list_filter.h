@@ -1,5 +1,6 @@
-// Conditions on the items of a list, for lists that the daemon does not filter:
-// "state = failed AND created >= 2026-11-21".
+// Conditions on the items of a list: "state = failed AND created >=
+// 2026-11-21". The program tests them all, and has the daemon test those that
+// it can.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -24,6 +25,8 @@ struct FilterField {
   Kind kind = Kind::kText;
   // Values of a text, if no others exist. Spaces, '-' and '_' are the same.
   std::vector<std::string> known = {};
+  // Its name in the filter of the daemon; empty: the daemon does not have it.
+  std::string of_daemon = {};
 };
 
 // A text, or a number; a time is its seconds since 1970. NaN meets no condition
@@ -43,11 +46,17 @@ class ListFilter {
   bool Meets(
       const std::function<FieldValue(std::string_view field)>& value) const;
 
+  // Conditions that the daemon can test, in its words, which an item has to
+  // meet among others; empty: none.
+  std::string ForDaemon() const;
+
  private:
   struct Condition {
     std::string field;
+    std::string of_daemon;
     std::string sign;
     FieldValue value;
+    bool is_time = false;
   };
   std::vector<Condition> conditions_;
 };

@@ -21,6 +21,11 @@ void AddListOptions(CLI::App* list,
   AddCsv(list, context);
 }
 
+void AddOrderBy(CLI::App* list, const std::string& help, ListOptions* options) {
+  list->add_option(
+      "--order-by", options->order_by, "A field, then asc or desc" + help);
+}
+
 void AddRigFilter(CLI::App* list, CLI::Option* rig, ListOptions* options) {
   list->add_option("--rigs",
                    options->rigs,

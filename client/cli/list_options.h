@@ -1,4 +1,5 @@
-// Options of the list commands, --limit and --filter, and the calls with them.
+// Options of the list commands, --limit, --filter and --order-by, and the calls
+// with them.
 #pragma once
 
 #include <google/protobuf/repeated_field.h>
@@ -19,6 +20,7 @@ struct ListOptions {
   std::size_t limit = 0;  // 0: all
   std::string filter;
   std::string rigs;  // a filter of rigs, for a list of many
+  std::string order_by;
 };
 
 // Adds --csv, of a command that calls Context::PrintList.
@@ -31,6 +33,9 @@ void AddListOptions(CLI::App* list,
                     const std::string& order,
                     const std::string& filter_help,
                     ListOptions* options);
+
+// Adds --order-by, whose help begins "A field, then asc or desc".
+void AddOrderBy(CLI::App* list, const std::string& help, ListOptions* options);
 
 // Adds --rigs, of a list that is of one rig, the option `rig`, or of many.
 void AddRigFilter(CLI::App* list, CLI::Option* rig, ListOptions* options);

@@ -29,12 +29,14 @@ std::vector<FilterField> RunFields() {
           {"state",
            Kind::kText,
            WordsOf<v1::Recalibration::State>(
-               v1::Recalibration::State_descriptor(), StateText)},
+               v1::Recalibration::State_descriptor(), StateText),
+           "state"},
           {"trigger",
            Kind::kText,
            WordsOf<v1::Recalibration::Trigger>(
-               v1::Recalibration::Trigger_descriptor(), TriggerText)},
-          {"created", Kind::kTime},
+               v1::Recalibration::Trigger_descriptor(), TriggerText),
+           "trigger"},
+          {"created", Kind::kTime, {}, "create_time"},
           {"ended", Kind::kTime},
           {"segments", Kind::kNumber},
           {"calibration", Kind::kNumber}};
@@ -68,6 +70,8 @@ int ListRuns(Context* context,
   v1::ListRecalibrationsRequest request;
   if (!rig.empty()) request.set_parent(RigName(rig));
   request.set_rig_filter(options.rigs);
+  request.set_filter(wanted->for_daemon);
+  request.set_order_by(options.order_by);
   v1::ListRecalibrationsResponse runs;
   const auto status = CallForItems<RecalibrationService>(
       stub.get(),
@@ -75,7 +79,7 @@ int ListRuns(Context* context,
       request,
       &v1::ListRecalibrationsResponse::mutable_recalibrations,
       options.limit,
-      *wanted,
+      wanted->test,
       &runs);
   if (!status.ok()) return Fail(*context, status);
   if (context->PrintList(runs)) return kDone;
@@ -185,9 +189,10 @@ void AddRunCommands(CLI::App* app, Context* context) {
   const auto list_options = std::make_shared<ListOptions>();
   AddListOptions(list,
                  context,
-                 "the newest",
+                 "the first of the list",
                  FilterHelp("state = failed AND created >= 7d", RunFields()),
                  list_options.get());
+  AddOrderBy(list, ": create_time or duration", list_options.get());
   AddRigFilter(list, of, list_options.get());
   list->callback([context, options, list_options] {
     context->command = [context, options, list_options] {

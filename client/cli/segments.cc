@@ -198,7 +198,6 @@ Table Scores(const v1::Segment& segment) {
 struct SegmentListOptions {
   std::string rig;
   ListOptions list;
-  std::string order_by;
   bool quarantined = false;
 };
 
@@ -214,15 +213,16 @@ int ListSegments(Context* context, const SegmentListOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::ListSegmentsRequest request;
   request.set_filter(FilterOf(options));
-  request.set_order_by(options.order_by);
+  request.set_order_by(options.list.order_by);
   if (options.rig.empty()) {
     request.set_rig_filter(options.list.rigs);
   } else {
     request.set_parent(RigName(options.rig));
-    const absl::Status known = CheckGroups(
-        *context,
-        options.rig,
-        {{"--filter", options.list.filter}, {"--order-by", options.order_by}});
+    const absl::Status known =
+        CheckGroups(*context,
+                    options.rig,
+                    {{"--filter", options.list.filter},
+                     {"--order-by", options.list.order_by}});
     if (!known.ok()) return FailInput(known);
   }
   v1::ListSegmentsResponse segments;
@@ -407,11 +407,10 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
                  kSegmentFilterHelp,
                  &options->list);
   AddRigFilter(list, of, &options->list);
-  list->add_option("--order-by",
-                   options->order_by,
-                   "A field, then asc or desc, e.g. 'entropy.camera asc'; "
-                   "without RIG: receive_time, temperature_c, angular_rate, "
-                   "acceleration or gain.GROUP");
+  AddOrderBy(list,
+             ", e.g. 'entropy.camera asc'; without RIG: receive_time, "
+             "temperature_c, angular_rate, acceleration or gain.GROUP",
+             &options->list);
   list->add_flag("--quarantined",
                  options->quarantined,
                  "List only unusable and quarantined segments, with the "

@@ -46,7 +46,7 @@ int ListSessions(Context* context,
                                    request,
                                    &v1::ListSessionsResponse::mutable_sessions,
                                    options.limit,
-                                   *wanted,
+                                   wanted->test,
                                    &sessions);
   if (!status.ok()) return Fail(*context, status);
   if (context->PrintList(sessions)) return kDone;

@@ -162,12 +162,20 @@ class Daemon:
         )
 
     def calibrations(
-        self, rig_id: str = "", *, rig_filter: str = ""
+        self,
+        rig_id: str = "",
+        *,
+        filter: str = "",
+        order_by: str = "",
+        rig_filter: str = "",
     ) -> Iterator[calibration.Calibration]:
-        """All versions, including rejected ones, of a rig or of all rigs of a
-        filter; newest first."""
+        """The versions, also rejected ones, of a rig or of all rigs of a
+        filter; newest first unless `order_by` is set."""
         request = calibration.ListCalibrationsRequest(
-            parent=_parent(rig_id), rig_filter=rig_filter
+            parent=_parent(rig_id),
+            filter=filter,
+            order_by=order_by,
+            rig_filter=rig_filter,
         )
         for page in self._pages(
             self.calibration_service.ListCalibrations, request
@@ -269,11 +277,20 @@ class Daemon:
             yield from page.events
 
     def recalibrations(
-        self, rig_id: str = "", *, rig_filter: str = ""
+        self,
+        rig_id: str = "",
+        *,
+        filter: str = "",
+        order_by: str = "",
+        rig_filter: str = "",
     ) -> Iterator[recalibration.Recalibration]:
-        """The runs of a rig, or of all rigs of a filter; newest first."""
+        """The runs of a rig, or of all rigs of a filter; newest first unless
+        `order_by` is set."""
         request = recalibration.ListRecalibrationsRequest(
-            parent=_parent(rig_id), rig_filter=rig_filter
+            parent=_parent(rig_id),
+            filter=filter,
+            order_by=order_by,
+            rig_filter=rig_filter,
         )
         for page in self._pages(
             self.recalibration_service.ListRecalibrations, request

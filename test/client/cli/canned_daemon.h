@@ -220,6 +220,8 @@ struct CannedDaemon final : v1::RigService::Service,
       const v1::ListCalibrationsRequest* request,
       v1::ListCalibrationsResponse* response) override {
     last_view = request->view();
+    last_filter = request->filter();
+    last_order = request->order_by();
     if (!deleted.empty() && request->parent() == deleted) {
       return Missing(deleted);
     }
@@ -336,6 +338,8 @@ struct CannedDaemon final : v1::RigService::Service,
       const v1::ListRecalibrationsRequest* request,
       v1::ListRecalibrationsResponse* response) override {
     last_name = request->parent();
+    last_filter = request->filter();
+    last_order = request->order_by();
     FillCannedPage(*request, run, response, [&](const v1::Recalibration& one) {
       *response->add_recalibrations() = one;
     });

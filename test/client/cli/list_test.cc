@@ -45,6 +45,28 @@ std::string Refusal(const std::string& filter) {
       ListFilter::Parse(filter, kFields, Now()).status().message());
 }
 
+TEST(ListFilter, TheDaemonTestsTheFieldsThatItHas) {
+  using Kind = FilterField::Kind;
+  const std::vector<FilterField> fields = {
+      {"state", Kind::kText, {"active", "rolled-back"}, "state"},
+      {"created", Kind::kTime, {}, "create_time"},
+      {"temperature_c", Kind::kNumber, {}, "temperature_c"},
+      {"version", Kind::kNumber}};
+  const auto for_daemon = [&](const std::string& text) {
+    const auto parsed = ListFilter::Parse(text, fields, Now());
+    EXPECT_TRUE(parsed.ok()) << parsed.status();
+    return parsed->ForDaemon();
+  };
+  EXPECT_EQ(for_daemon(""), "");
+  EXPECT_EQ(for_daemon("version = 3 AND state != active"), "");
+  EXPECT_EQ(for_daemon("state = rolled-back AND version = 3 AND "
+                       "temperature_c >= -2.5"),
+            "state = ROLLED_BACK AND temperature_c >= -2.5");
+  EXPECT_EQ(for_daemon("created <= 1h AND created > 2h"),
+            "create_time <= 2026-11-21T03:10:03Z AND "
+            "create_time > 2026-11-21T02:10:03Z");
+}
+
 TEST(ListFilter, ComparesTextsNumbersAndTimes) {
   EXPECT_TRUE(Meets(""));
   EXPECT_TRUE(Meets("state = rolled-back"));
@@ -138,6 +160,28 @@ TEST_F(Lists, TheLimitIsOfThoseThatMeetTheFilter) {
   EXPECT_EQ(Selfcal({"run", "list", "a", "--filter", "state = failed"}).out,
             "3\tfailed\tunknown\t-\t-\t0\t-\t\n");
   EXPECT_EQ(Lines({"run", "list", "a", "--filter", "run > 3"}), 2);
+}
+
+// The daemon tests what it can, so that the others are not sent; the program
+// tests all of it.
+TEST_F(Lists, HaveTheDaemonFilterAndSort) {
+  Selfcal({"calibration",
+           "list",
+           "--filter",
+           "state = rejected AND version >= 2 AND verdict != good",
+           "--order-by",
+           "temperature_c asc"});
+  EXPECT_EQ(daemon_.last_filter, "state = REJECTED");
+  EXPECT_EQ(daemon_.last_order, "temperature_c asc");
+  Selfcal({"run",
+           "list",
+           "--filter",
+           "trigger = \"tables full\" AND created >= 2026-11-21",
+           "--order-by",
+           "duration"});
+  EXPECT_EQ(daemon_.last_filter,
+            "trigger = TABLES_FULL AND create_time >= 2026-11-21T00:00:00Z");
+  EXPECT_EQ(daemon_.last_order, "duration");
 }
 
 TEST_F(Lists, RefuseUnknownFieldsAndStatesWithTwo) {
