@@ -87,7 +87,10 @@ absl::StatusOr<Listed<VersionKey>> FindVersions(Connection* db,
   }
   AndCalibrationQuery(query, &condition);
   AndAfter(order, place, &condition);
-  if (rig.empty()) AddRigConditions(of, "g", &condition);
+  SqlCondition of_rigs = condition.Next();
+  if (rig.empty()) AddRigConditions(of, "g", &of_rigs);
+  const bool some_rigs = !of_rigs.is_empty();
+  if (some_rigs) condition.And(of_rigs);
   const int size = PageSize(page);
   const std::string limit = condition.Parameter(std::int64_t{size + 1});
   Statement read(db,

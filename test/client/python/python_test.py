@@ -120,6 +120,15 @@ class PythonTest(unittest.TestCase):
         self.assertEqual([r.name for r in self.daemon.rigs()], ["rigs/tablet"])
         self.assertEqual(len(self.daemon.tables("tablet")), 3)
         self.assertEqual(list(self.daemon.recalibrations("tablet")), [])
+        failed = self.daemon.recalibrations(
+            filter="state = FAILED", order_by="duration asc"
+        )
+        self.assertEqual(list(failed), [])
+        for verdict, versions in (("FACTORY", [1]), ("GOOD", [])):
+            found = self.daemon.calibrations(
+                filter=f"verdict = {verdict}", order_by="create_time asc"
+            )
+            self.assertEqual([one.version for one in found], versions)
         self.assertEqual(self.daemon.calibration("tablet").version, 1)
         watch = self.daemon.watch_calibration("tablet")
         self.assertEqual(next(watch).version, 1)
