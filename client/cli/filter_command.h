@@ -19,7 +19,8 @@ namespace selfcal::client {
 // The conditions of a filter.
 template <typename Item>
 struct ItemFilter {
-  // Whether an item meets them, for CallForItems; empty without a filter.
+  // Returns true for an item that meets them, for CallForItems; empty without a
+  // filter.
   std::function<bool(const Item&)> test;
   std::string for_daemon;  // ListFilter::ForDaemon
 };

@@ -10,7 +10,7 @@ ALTER TABLE calibrations ADD COLUMN verdict BIGINT;
 -- Mean over the segments that report one [degrees Celsius]; NULL: none does.
 ALTER TABLE calibrations ADD COLUMN temperature_c DOUBLE PRECISION;
 
--- As VerdictOf of server/pipeline/verdict.h.
+-- The kind of VerdictOf (server/pipeline/verdict.h).
 CREATE VIEW shown_verdicts AS
 SELECT c.rig, c.version,
   CASE
@@ -119,9 +119,9 @@ CREATE INDEX runs_by_trigger ON runs (started_by, create_time_ns, rig, run);
 CREATE INDEX runs_by_duration ON runs (duration_ns, rig, run)
   WHERE duration_ns IS NOT NULL;
 
--- How many rigs have a label. Without it, the planner takes names and values for
--- independent: it expects a tenth of the rigs that have two labels, and reads
--- and sorts all of them in place of the first ones of a list.
+-- The number of rigs that have a label. Otherwise the planner takes names and
+-- values for independent: it expects a tenth of the rigs that have two labels,
+-- and reads and sorts all of them in place of the first ones of a list.
 CREATE STATISTICS label_values (mcv) ON name, value FROM rig_labels;
 
 ANALYZE rig_labels;

@@ -10,7 +10,7 @@ ALTER TABLE calibrations ADD COLUMN verdict INTEGER;
 -- Mean over the segments that report one [degrees Celsius]; NULL: none does.
 ALTER TABLE calibrations ADD COLUMN temperature_c REAL;
 
--- As VerdictOf of server/pipeline/verdict.h.
+-- The kind of VerdictOf (server/pipeline/verdict.h).
 CREATE VIEW shown_verdicts AS
 SELECT c.rig, c.version,
   CASE

@@ -64,7 +64,7 @@ void AndCalibrationQuery(const CalibrationQuery& query, SqlCondition* to) {
   AndIs("c.verdict", query.verdict, to);
   AndRange("c.create_time_ns", query.create_time_ns, to);
   AndRange("c.temperature_c", query.temperature_c, to);
-  // As the condition of the index.
+  // The condition of the index.
   if (query.order == CalibrationQuery::Order::kTemperature) {
     to->And("c.temperature_c IS NOT NULL");
   }
@@ -140,8 +140,8 @@ ReadVersions(Connection* db,
 
 }  // namespace
 
-// Of all rigs, a version whose record is damaged is left out, as one must not
-// hide those of all other rigs.
+// A version whose record is damaged is left out of a list of all rigs, as it
+// must not hide those of the others.
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
     Connection* db,
     const std::string& rig,

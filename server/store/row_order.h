@@ -38,7 +38,7 @@ RowPlace PlaceOfRow(const RowOrder& order,
 
 // The condition that a row follows the place, if there is one.
 void AndAfter(const RowOrder& order, const RowPlace& place, SqlCondition* to);
-// What follows ORDER BY.
+// The columns with their direction, for ORDER BY.
 std::string OrderText(const RowOrder& order);
 
 }  // namespace selfcal::server

@@ -17,7 +17,7 @@ enum class RunState {
   kCancelled = 5,
 };
 
-// Why a run was created. The numbers are those of
+// The reason why a run was created. The numbers are those of
 // selfcal.v1.Recalibration.Trigger and never change.
 enum class RunTrigger {
   kTablesFull = 1,

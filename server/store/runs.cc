@@ -68,10 +68,10 @@ absl::Status ReadSnapshots(Connection* db,
   return read.status();
 }
 
-// How the columns cause and session_ended state a trigger, with `change`: the
-// column started_by has its number. Those that were there first share a cause.
-// Any other one has its number in session_ended, beside the cause of a manual
-// run, for which a program from before it takes the run.
+// The columns that state a trigger, with `change`: the column started_by has
+// its number. Those that were there first share a cause. Any other one has its
+// number in session_ended, beside the cause of a manual run, for which a
+// program from before it takes the run.
 struct TriggerColumns {
   std::int64_t cause = 0;
   std::int64_t session_ended = 0;
@@ -172,7 +172,7 @@ std::string RunListName(const std::string& rig,
                      query.descending);
 }
 
-// As the lists of versions are (calibration_lists.cc).
+// The same as that of versions (CalibrationOrder).
 RowOrder RunOrder(const std::string& rig, const RunQuery& query) {
   RowOrder order{.columns = {}, .descending = query.descending};
   if (query.order == RunQuery::Order::kDuration) {
@@ -190,7 +190,7 @@ void AndRunQuery(const RunQuery& query, SqlCondition* to) {
   AndIs("r.state", query.state, to);
   AndIs("r.started_by", query.trigger, to);
   AndRange("r.create_time_ns", query.create_time_ns, to);
-  // As the condition of the index.
+  // The condition of the index.
   if (query.order == RunQuery::Order::kDuration) {
     to->And("r.duration_ns IS NOT NULL");
   }

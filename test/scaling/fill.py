@@ -335,7 +335,7 @@ def _raise_alarms(cursor) -> None:
         "SELECT c.rig, 1, min(t.group_name) FROM changes c "
         "JOIN tables t USING (rig) GROUP BY c.rig"
     )
-    # As the trigger does, which is off.
+    # The trigger that does this is off.
     cursor.execute(
         "UPDATE calibrations c SET verdict = s.kind FROM shown_verdicts s "
         "WHERE s.rig = c.rig AND s.version = c.version "

@@ -9,6 +9,7 @@
 #include "core/model/so3.h"
 #include "server/encode/compare.h"
 #include "server/encode/encode.h"
+#include "server/store/change_rows.h"
 #include "test/core/simulation/rigs.h"
 #include "test/server/grpc/service_test.h"
 
@@ -253,10 +254,10 @@ TEST_F(CalibrationServiceTest, APageHasFewerVersionsWithDetails) {
   EXPECT_EQ(page.calibrations_size(), 17);
 }
 
-// The filter finds a version by the verdict that the list shows, also after a
-// finding.
+// The filter finds a version by the verdict that the list shows, whatever
+// record has changed that.
 TEST_F(CalibrationServiceTest, AFilterMeetsTheVerdictThatIsShown) {
-  AddCalibrated();
+  const Rig rig = AddCalibrated();
   const auto expect_shown = [&](const std::vector<v1::Verdict::Kind>& newest) {
     v1::ListCalibrationsResponse all;
     ASSERT_TRUE(List("rigs/r", 0, "", &all).ok());
@@ -281,9 +282,40 @@ TEST_F(CalibrationServiceTest, AFilterMeetsTheVerdictThatIsShown) {
       }
     }
   };
+  const auto activate = [&](std::int64_t version) {
+    return domain_->ActivateCalibration("r", version, "eve", "trial").ok();
+  };
   expect_shown({v1::Verdict::UNKNOWN, v1::Verdict::FACTORY});
+  StoredChange change;
+  change.rig = "r";
+  change.change = 1;
+  change.time_ns = 1;
+  change.base_version = 1;
+  change.first_sequence = 1;
+  ASSERT_TRUE(
+      store_
+          ->Transact(
+              "r", 1, [&](UnitOfWork* tx) { return InsertChange(tx, change); })
+          .ok());
+  expect_shown({v1::Verdict::NOT_TRUSTWORTHY, v1::Verdict::FACTORY});
+  ASSERT_TRUE(activate(1));
+  expect_shown({v1::Verdict::UNKNOWN, v1::Verdict::FACTORY});
+  ASSERT_TRUE(activate(2));
+  expect_shown({v1::Verdict::NOT_TRUSTWORTHY, v1::Verdict::FACTORY});
+  ASSERT_TRUE(activate(1));
   ASSERT_TRUE(domain_->ReportDisagreement("r", 2, "by 3 sigma").ok());
   expect_shown({v1::Verdict::NOT_TRUSTWORTHY, v1::Verdict::FACTORY});
+  const auto run = domain_->CreateManualRun("r", true);
+  ASSERT_TRUE(run.ok()) << run.status();
+  ASSERT_TRUE(domain_->BeginRun("r", run->run).ok());
+  StoredCalibration rejected =
+      TestCalibration(rig, *store_->GetRun("r", run->run));
+  rejected.state = CalibrationState::kRejected;
+  rejected.verdict.kind = VerdictKind::kGood;
+  ASSERT_TRUE(domain_->FinishRun("r", run->run, rejected).ok());
+  expect_shown({v1::Verdict::NOT_TRUSTWORTHY,
+                v1::Verdict::NOT_TRUSTWORTHY,
+                v1::Verdict::FACTORY});
 }
 
 TEST_F(CalibrationServiceTest, AFaultyFilterOrOrderIsRefused) {

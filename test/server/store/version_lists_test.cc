@@ -397,7 +397,7 @@ TEST_P(VersionListsTest, ASummaryHasAllButTheDetails) {
   EXPECT_TRUE(summary.report->segment_fits.empty());
 }
 
-// As an earlier program has written them.
+// The records are those of an earlier program.
 TEST_P(VersionListsTest, VersionsAreCompletedLater) {
   now_ns_ = kTime;
   AddRig("a", 20.0);

@@ -145,7 +145,7 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
             "c8e0e34d3debc3190e74daceda7847e2ba51b9ea1e7bbac8ba88f1414b3ea858");
   EXPECT_EQ(migrations[24].name, "0025_versions_and_runs.sql");
   EXPECT_EQ(migrations[24].sha256,
-            "99c89be4985fc2a9a8616d05ed46c8366abcda123aee20b33eeca480de7fc1df");
+            "93597e60786f2cd4f94491b3c22096ed76a7c9dddf83cd032ff8be7088e949bb");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
