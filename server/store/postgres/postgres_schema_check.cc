@@ -51,8 +51,9 @@ constexpr char kObjects[] =
     "    pg_get_functiondef(p.oid) FROM pg_proc p "
     "  WHERE p.pronamespace = current_schema()::regnamespace "
     "    AND p.prokind = 'f' "
-    "UNION ALL SELECT format('view %s', v.relname), pg_get_viewdef(v.oid) "
-    "  FROM pg_class v WHERE v.relkind IN ('v', 'm') "
+    "UNION ALL SELECT format('view %s', v.relname), "
+    "    concat(pg_get_viewdef(v.oid), v.reloptions) FROM pg_class v WHERE "
+    "v.relkind IN ('v', 'm') "
     "    AND v.relnamespace = current_schema()::regnamespace";
 
 // `text` without the name of the schema in front of other names.

@@ -129,6 +129,7 @@ TEST_F(PostgresSchemaTest, KeysBeginWithTheRig) {
               ElementsAre("clock by clock",
                           "cohorts by label",
                           "ended_reports by device",
+                          "fleet_readers by role",
                           "replicas by replica",
                           "rigs by id",
                           "schema_migrations by version"));
@@ -196,6 +197,7 @@ TEST_F(PostgresSchemaTest, EveryDifferenceFromTheMigrationsIsFound) {
        "function refuse"},
       {"DROP TABLE disagreements", "table disagreements"},
       {"CREATE TABLE more (x BIGINT)", "table more"},
+      {"ALTER VIEW fleet_rigs RESET (security_barrier)", "view fleet_rigs"},
   };
   for (const auto& [sql, name] : changes) {
     ASSERT_TRUE(db_->Execute("BEGIN").ok());
