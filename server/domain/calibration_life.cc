@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "server/domain/outdated_scores.h"
 #include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/events.h"
@@ -153,6 +154,7 @@ absl::StatusOr<StoredCalibration> ActivateCalibration(
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active, ActiveVersion(tx));
   const bool back = version < active;
   SELFCAL_RETURN_IF_ERROR(MakeActive(tx, version, chosen.state));
+  SELFCAL_RETURN_IF_ERROR(NoteOutdatedScores(tx));
   SELFCAL_RETURN_IF_ERROR(
       AppendEvent(tx,
                   back ? EventKind::kCalibrationRolledBack

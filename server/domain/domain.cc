@@ -13,6 +13,7 @@
 #include "server/domain/deletion.h"
 #include "server/domain/intake.h"
 #include "server/domain/offers.h"
+#include "server/domain/outdated_scores.h"
 #include "server/domain/quotas.h"
 #include "server/domain/reports.h"
 #include "server/domain/run_creation.h"
@@ -252,12 +253,25 @@ absl::StatusOr<ScoreCommit> Domain::CommitScore(
 }
 
 absl::Status Domain::ReplaceScore(const RigClaim& claim,
-                                  std::int64_t active,
+                                  const ScoreBasis& basis,
                                   const SegmentKey& key,
                                   const SegmentInformation& information,
                                   const SegmentEnds& ends) {
   return ChangeOwnRigOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
-    return server::ReplaceScore(tx, active, key, information, ends);
+    return server::ReplaceScore(tx, basis, key, information, ends);
+  });
+}
+
+absl::Status Domain::NoteOutdatedScores(const RigClaim& claim) {
+  return ChangeOwnRigOnly(store_, claim, clock_(), [](UnitOfWork* tx) {
+    return server::NoteOutdatedScores(tx);
+  });
+}
+
+absl::Status Domain::EndRescoring(const RigClaim& claim,
+                                  const ScoreBasis& basis) {
+  return ChangeOwnRigOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
+    return server::EndRescoring(tx, basis);
   });
 }
 

@@ -102,13 +102,20 @@ class Domain {
 
   // Replaces the score of a scored segment by a later one, also in the tables
   // that hold it. Changes nothing if its data is gone. FAILED_PRECONDITION
-  // unless `active` is the active version: another activation has scores of its
-  // own.
+  // unless `basis` is the present one: another activation, or another prior,
+  // has scores of its own.
   absl::Status ReplaceScore(const RigClaim& claim,
-                            std::int64_t active,
+                            const ScoreBasis& basis,
                             const SegmentKey& key,
                             const SegmentInformation& information,
                             const SegmentEnds& ends);
+
+  // NoteOutdatedScores of outdated_scores.h.
+  absl::Status NoteOutdatedScores(const RigClaim& claim);
+  // All scored segments whose data is kept, and can be read, have scores of
+  // this basis: none is outdated any more. Changes nothing if the basis is not
+  // the present one.
+  absl::Status EndRescoring(const RigClaim& claim, const ScoreBasis& basis);
 
   // Marks a segment that cannot be used as unusable: removes it from the queue
   // and from the tables for good, and deletes its data unless an unfinished run

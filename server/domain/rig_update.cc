@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "server/domain/outdated_scores.h"
 #include "server/status/status_macros.h"
 #include "server/store/events.h"
 #include "server/store/records.h"
@@ -51,6 +52,7 @@ absl::StatusOr<RigUpdate> UpdateRig(UnitOfWork* tx,
       fmt::format(
           "changed by {}{}{}", caller, reason.empty() ? "" : ": ", reason)));
   const bool rescore = PriorSigmas(before.rig) != PriorSigmas(after.rig);
+  if (rescore) SELFCAL_RETURN_IF_ERROR(NoteOutdatedScores(tx));
   return RigUpdate{std::move(after), rescore};
 }
 

@@ -17,7 +17,8 @@ using RigChange = std::function<absl::StatusOr<StoredRig>(const StoredRig&)>;
 
 struct RigUpdate {
   StoredRig rig;
-  // True if the scores of stored segments follow another prior now.
+  // True if the scores of stored segments follow another prior now: they are
+  // noted as outdated (outdated_scores.h).
   bool rescore = false;
 };
 

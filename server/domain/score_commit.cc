@@ -18,6 +18,11 @@
 
 namespace selfcal::server {
 
+absl::StatusOr<ScoreBasis> PresentBasis(UnitOfWork* tx, const Rig& rig) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active, ActiveVersion(tx));
+  return ScoreBasis{active, PriorSigmas(rig)};
+}
+
 absl::StatusOr<ScoreCommit> CommitScore(
     UnitOfWork* tx,
     const SegmentKey& key,
@@ -28,8 +33,7 @@ absl::StatusOr<ScoreCommit> CommitScore(
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
   ScoreCommit commit;
-  SELFCAL_ASSIGN_OR_RETURN(commit.basis.active, ActiveVersion(tx));
-  commit.basis.prior_sigmas = PriorSigmas(rig.rig);
+  SELFCAL_ASSIGN_OR_RETURN(commit.basis, PresentBasis(tx, rig.rig));
   if (segment.state == SegmentState::kScored) {
     SELFCAL_ASSIGN_OR_RETURN(commit.tables,
                              TablesOfSegment(tx, segment.sequence));
@@ -76,19 +80,23 @@ absl::StatusOr<ScoreCommit> CommitScore(
 }
 
 absl::Status ReplaceScore(UnitOfWork* tx,
-                          std::int64_t active,
+                          const ScoreBasis& basis,
                           const SegmentKey& key,
                           const SegmentInformation& information,
                           const SegmentEnds& ends) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t now_active, ActiveVersion(tx));
-  if (now_active != active) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
+  SELFCAL_ASSIGN_OR_RETURN(const ScoreBasis present, PresentBasis(tx, rig.rig));
+  if (present.active != basis.active) {
     return absl::FailedPreconditionError(
         fmt::format("version {} of rig {} is active by now, not {}",
-                    now_active,
+                    present.active,
                     tx->rig(),
-                    active));
+                    basis.active));
   }
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
+  if (present != basis) {
+    return absl::FailedPreconditionError(
+        fmt::format("rig {} has another prior by now", tx->rig()));
+  }
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
   SELFCAL_ASSIGN_OR_RETURN(const bool has_data, HasData(tx, segment.sequence));
   if (segment.state != SegmentState::kScored || !has_data) {

@@ -30,6 +30,9 @@ struct ScoreBasis {
   }
 };
 
+// The basis with which a segment of the rig is to be scored at present.
+absl::StatusOr<ScoreBasis> PresentBasis(UnitOfWork* tx, const Rig& rig);
+
 // Result of the commit of a score.
 struct ScoreCommit {
   std::vector<std::string> tables;  // groups it entered
@@ -52,7 +55,7 @@ absl::StatusOr<ScoreCommit> CommitScore(
 
 // Domain::ReplaceScore.
 absl::Status ReplaceScore(UnitOfWork* tx,
-                          std::int64_t active,
+                          const ScoreBasis& basis,
                           const SegmentKey& key,
                           const SegmentInformation& information,
                           const SegmentEnds& ends);

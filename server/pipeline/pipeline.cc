@@ -249,11 +249,7 @@ class PipelineImpl : public Pipeline {
     SELFCAL_ASSIGN_OR_RETURN(RigUpdate update,
                              domain_->UpdateRig(rig, change, caller, reason));
     spdlog::info("{} has changed rig {}", caller, rig);
-    if (update.rescore) {
-      SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
-                               store_->GetActiveCalibration(rig));
-      RescoreKept(domain_, estimators_, rig, active.version, active.theta);
-    }
+    if (update.rescore) RescoreAtActive(domain_, estimators_, rig);
     return std::move(update.rig);
   }
 
@@ -331,7 +327,7 @@ class PipelineImpl : public Pipeline {
                  rig,
                  reason);
     calibration_watchers_.Publish(active);
-    RescoreKept(domain_, estimators_, rig, active.version, active.theta);
+    RescoreAtActive(domain_, estimators_, rig);
     return active;
   }
 

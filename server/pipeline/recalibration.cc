@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/pipeline/backoff.h"
+#include "server/pipeline/rescoring.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
@@ -17,6 +18,9 @@ namespace {
 // How often devices are looked for that have become silent: they are so for a
 // day.
 constexpr std::chrono::minutes kSilentInterval{1};
+
+// Rigs whose outdated scores are computed again at once.
+constexpr int kRescoredRigs = 100;
 
 }  // namespace
 
@@ -226,6 +230,21 @@ absl::Status Recalibrator::StartDueRuns() {
   return absl::OkStatus();
 }
 
+absl::Status Recalibrator::ResumeRescoring(const Executor& executor) {
+  // One daemon does so for all: it is rare.
+  if (!shared_.claims->IsFirst()) return absl::OkStatus();
+  const std::lock_guard lock(starting_);
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::vector<std::string> rigs,
+      shared_.store()->ListRigsToCheck(
+          RigCheck::kScores, shared_.options.now_ns(), kRescoredRigs));
+  for (const std::string& rig : rigs) {
+    if (!executor.current.open()) break;
+    RescoreAtActive(shared_.domain, shared_.estimators, rig);
+  }
+  return absl::OkStatus();
+}
+
 Execution Recalibrator::ExecuteOwn(Executor* executor,
                                    const StoredRun& listed) {
   const std::optional<RigClaim> claim = shared_.claims->Find(listed.rig);
@@ -262,6 +281,7 @@ absl::StatusOr<Execution> Recalibrator::ExecuteAll(Executor* executor) {
   for (bool any = true; any && worst != Execution::kTryLater;) {
     any = false;
     SELFCAL_RETURN_IF_ERROR(StartDueRuns());
+    SELFCAL_RETURN_IF_ERROR(ResumeRescoring(*executor));
     const auto again =
         std::chrono::steady_clock::now() + shared_.options.recheck;
     SELFCAL_ASSIGN_OR_RETURN(

@@ -82,6 +82,9 @@ class Recalibrator {
   absl::StatusOr<Execution> ExecuteAll(Executor* executor);
   // Creates the runs of times and of sessions that have ended.
   absl::Status StartDueRuns();
+  // Computes outdated scores again, of rigs for which nobody has ended that in
+  // time: it has failed, or its daemon has ended.
+  absl::Status ResumeRescoring(const Executor& executor);
   // Executes the run if the work of its rig is this daemon's, and no other
   // thread does it.
   Execution ExecuteOwn(Executor* executor, const StoredRun& listed);
@@ -89,7 +92,9 @@ class Recalibrator {
   const RunContext shared_;  // without a current run
   Watchers<StoredCalibration>* const calibration_watchers_;
   SessionEnds sessions_;
-  std::mutex starting_;  // one thread at a time creates runs; guards these:
+  // One thread at a time creates runs, or computes outdated scores; guards the
+  // next two.
+  std::mutex starting_;
   VersionCompletion completion_;
   SessionEnds::Clock::time_point look_for_silent_{};  // at this time again
   std::vector<std::unique_ptr<Executor>> executors_;

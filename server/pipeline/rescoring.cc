@@ -20,6 +20,7 @@ absl::Status TryRescore(Domain* domain,
   const std::string& rig_id = claim.rig;
   Store* const store = domain->store();
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(rig_id));
+  const ScoreBasis basis{active, PriorSigmas(rig.rig)};
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredSegment> kept,
                            ListKept(store, rig_id));
   for (const StoredSegment& stored : kept) {
@@ -31,7 +32,7 @@ absl::Status TryRescore(Domain* domain,
     SELFCAL_RETURN_IF_ERROR(segment.status());
     SELFCAL_RETURN_IF_ERROR(
         domain->ReplaceScore(claim,
-                             active,
+                             basis,
                              stored.key,
                              estimators.score(rig.rig, theta, *segment),
                              estimators.ends(rig.rig, theta, *segment)));
@@ -39,14 +40,28 @@ absl::Status TryRescore(Domain* domain,
   return absl::OkStatus();
 }
 
+absl::Status TryRescoreAtActive(Domain* domain,
+                                const Estimators& estimators,
+                                const RigClaim& claim) {
+  SELFCAL_RETURN_IF_ERROR(domain->NoteOutdatedScores(claim));
+  Store* const store = domain->store();
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(claim.rig));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
+                           store->GetActiveCalibration(claim.rig));
+  if (!RescoreKept(domain, estimators, claim, active.version, active.theta)) {
+    return absl::OkStatus();  // it stays recorded
+  }
+  return domain->EndRescoring(claim, {active.version, PriorSigmas(rig.rig)});
+}
+
 }  // namespace
 
-void RescoreKept(Domain* domain,
+bool RescoreKept(Domain* domain,
                  const Estimators& estimators,
                  const RigClaim& claim,
                  std::int64_t active,
                  const Calibration& theta) {
-  if (!estimators.ends) return;
+  if (!estimators.ends) return true;
   absl::Status status;
   try {
     status = TryRescore(domain, estimators, claim, active, theta);
@@ -55,6 +70,18 @@ void RescoreKept(Domain* domain,
   }
   if (!status.ok()) {
     spdlog::warn("not all kept segments of rig {} are rescored: {}",
+                 claim.rig,
+                 status.ToString());
+  }
+  return status.ok();
+}
+
+void RescoreAtActive(Domain* domain,
+                     const Estimators& estimators,
+                     const RigClaim& claim) {
+  const absl::Status status = TryRescoreAtActive(domain, estimators, claim);
+  if (!status.ok()) {
+    spdlog::warn("scores of rig {} are outdated until another attempt: {}",
                  claim.rig,
                  status.ToString());
   }

@@ -226,25 +226,18 @@ absl::StatusOr<StoredCalibration> ValidateAndFinish(
     // Before the run ends, so that a crash between the two repeats it, and
     // whoever sees the version sees the scores at it.
     const bool becomes_active = candidate.state == CalibrationState::kActive;
-    if (becomes_active) {
-      RescoreKept(context.domain,
-                  context.estimators,
-                  context.claim,
-                  candidate.validation->active_version,
-                  candidate.theta);
-    }
+    const bool rescored =
+        !becomes_active || RescoreKept(context.domain,
+                                       context.estimators,
+                                       context.claim,
+                                       candidate.validation->active_version,
+                                       candidate.theta);
     auto finished =
         context.domain->FinishRun(context.claim, run.run, candidate, finding);
     if (absl::IsAborted(finished.status())) continue;
     if (becomes_active && finished.ok() &&
-        finished->state != CalibrationState::kActive) {
-      SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
-                               context.store()->GetActiveCalibration(run.rig));
-      RescoreKept(context.domain,
-                  context.estimators,
-                  context.claim,
-                  active.version,
-                  active.theta);
+        (!rescored || finished->state != CalibrationState::kActive)) {
+      RescoreAtActive(context.domain, context.estimators, context.claim);
     }
     return finished;
   }

@@ -248,7 +248,7 @@ void ScoringWorkers::ScoreAgain(const Claim& claim) {
     if (!(*score)->ends) return;
     status = Retry([&] {
       return domain_->ReplaceScore(claim.of_rig,
-                                   (*score)->basis.active,
+                                   (*score)->basis,
                                    claim.key,
                                    (*score)->information,
                                    *(*score)->ends);

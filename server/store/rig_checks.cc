@@ -9,7 +9,15 @@ namespace selfcal::server {
 namespace {
 
 const char* ColumnOf(RigCheck check) {
-  return check == RigCheck::kSession ? "session_check_ns" : "time_check_ns";
+  switch (check) {
+    case RigCheck::kSession:
+      return "session_check_ns";
+    case RigCheck::kTime:
+      return "time_check_ns";
+    case RigCheck::kScores:
+      return "score_check_ns";
+  }
+  return "";
 }
 
 }  // namespace

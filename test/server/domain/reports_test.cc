@@ -673,7 +673,7 @@ TEST_P(ReportsTest, RigOfADeviceCannotBeChangedAtTheHub) {
   for (const absl::Status& status :
        {domain_->PutSegment("a", Segment(2)).status(),
         domain_->CommitScore("a", unscored, score).status(),
-        domain_->ReplaceScore("a", 1, scored, score, {}),
+        domain_->ReplaceScore("a", {1, {}}, scored, score, {}),
         domain_->MarkUnusable("a", scored, "x"),
         domain_->DeferRun("a", 1, "x"),
         domain_->BeginRun("a", 1).status(),

@@ -54,6 +54,10 @@ class RememberedTest : public StoreTest {
                     .ok());
   }
 
+  ScoreBasis Basis(std::int64_t active) const {
+    return {active, PriorSigmas(rig_)};
+  }
+
   // By index; whether each is remembered by its ends.
   std::vector<std::pair<std::int64_t, bool>> Remembered(std::int64_t run = 1) {
     std::vector<std::pair<std::int64_t, bool>> listed;
@@ -127,7 +131,8 @@ TEST_P(RememberedTest, ALaterScoreTakesThePlaceOfTheFirst) {
   SegmentInformation better = FakeInformation(rig_, -70.0, 6.0);
   better.theta0.cameras[0].f.x() += 1;
   const SegmentEnds ends = FakeEnds(rig_, {"s", 1});
-  ASSERT_TRUE(domain_->ReplaceScore("a", 1, {"s", 1}, better, ends).ok());
+  ASSERT_TRUE(
+      domain_->ReplaceScore("a", Basis(1), {"s", 1}, better, ends).ok());
   const auto segment = store_->GetSegment("a", {"s", 1});
   ASSERT_TRUE(segment.ok() && segment->information);
   EXPECT_EQ(segment->information->theta0.cameras[0].f.x(),
@@ -148,7 +153,7 @@ TEST_P(RememberedTest, NoScoreTakesThePlaceWhereTheDataIsGone) {
   ASSERT_FALSE(HasData("a", 2));
   ASSERT_TRUE(domain_
                   ->ReplaceScore("a",
-                                 1,
+                                 Basis(1),
                                  {"s", 2},
                                  FakeInformation(rig_, -99.0),
                                  FakeEnds(rig_, {"s", 99}))
@@ -156,8 +161,12 @@ TEST_P(RememberedTest, NoScoreTakesThePlaceWhereTheDataIsGone) {
   EXPECT_EQ(store_->GetSegment("a", {"s", 2})->information->groups[0].entropy,
             50.0);
   EXPECT_THAT(Remembered(), ::testing::Contains(std::pair(2, true)));
-  EXPECT_TRUE(absl::IsNotFound(domain_->ReplaceScore(
-      "a", 1, {"s", 77}, FakeInformation(rig_, 1), FakeEnds(rig_, {"s", 77}))));
+  EXPECT_TRUE(
+      absl::IsNotFound(domain_->ReplaceScore("a",
+                                             Basis(1),
+                                             {"s", 77},
+                                             FakeInformation(rig_, 1),
+                                             FakeEnds(rig_, {"s", 77}))));
 }
 
 // One that was begun before another version became active.
@@ -171,7 +180,7 @@ TEST_P(RememberedTest, NoScoreOfAnotherVersionTakesThePlaceOfTheFirst) {
   ASSERT_TRUE(domain_->FinishRun("a", 1, next).ok());
   const auto replace = [&](std::int64_t active) {
     return domain_->ReplaceScore("a",
-                                 active,
+                                 Basis(active),
                                  {"s", 1},
                                  FakeInformation(rig_, -70.0 - active, 6.0),
                                  FakeEnds(rig_, {"s", 1}));

@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 25u);
+  ASSERT_EQ(migrations.size(), 26u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -146,6 +146,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[24].name, "0025_versions_and_runs.sql");
   EXPECT_EQ(migrations[24].sha256,
             "93597e60786f2cd4f94491b3c22096ed76a7c9dddf83cd032ff8be7088e949bb");
+  EXPECT_EQ(migrations[25].name, "0026_outdated_scores.sql");
+  EXPECT_EQ(migrations[25].sha256,
+            "273945e862692f12d50cd4c0a14b9be1e95eb7532fbc9181517259921eb4cec5");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

@@ -142,6 +142,7 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
       "rigs.alarms",
       "rigs.session_check_ns",
       "rigs.time_check_ns",
+      "rigs.score_check_ns",
       "rigs.rig",
       "rigs.id",
       "rigs.last_seen_ns",
@@ -357,6 +358,9 @@ TEST_F(SchemaTest, StatementsReadTheRowsThatTheyNeed) {
       {"SELECT id FROM rigs WHERE time_check_ns <= 1 "
        "ORDER BY time_check_ns LIMIT 10",
        {"SEARCH rigs USING INDEX rigs_by_time_check (time_check_ns<?)"}},
+      {"SELECT id FROM rigs WHERE score_check_ns <= 1 "
+       "ORDER BY score_check_ns LIMIT 10",
+       {"SEARCH rigs USING INDEX rigs_by_score_check (score_check_ns<?)"}},
       {"SELECT e.value FROM estimates e JOIN rigs r ON r.rig = e.rig "
        "WHERE e.rig = 1 AND (e.version, e.component) > (1, 'x') "
        "ORDER BY e.rig, e.version, e.component LIMIT 10",
