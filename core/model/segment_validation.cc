@@ -164,14 +164,14 @@ std::string TimeFault(const std::vector<Timed>& elements,
   if (!TimeInRange(t_ns)) {
     return std::to_string(t_ns) + " ns is out of range";
   }
-  if (i == 0 || !TimeInRange(elements[i - 1].t_ns)) return "";
+  if (i == 0 || !TimeInRange(elements[i - 1].t_ns)) return {};
   const std::int64_t before_ns = elements[i - 1].t_ns;
   if (t_ns <= before_ns) {
     return std::to_string(t_ns) + " ns is not after the previous " +
            std::to_string(before_ns) + " ns; sort by time";
   }
   const double gap_s = Seconds(before_ns, t_ns);
-  if (gap_s <= max_gap_s) return "";
+  if (gap_s <= max_gap_s) return {};
   return "is " + Readable(gap_s) + " s after the previous; at most " +
          Readable(max_gap_s) + " s are allowed";
 }
@@ -330,7 +330,7 @@ void CheckLandmarks(const MotionSegment& segment,
 std::string IndexFault(std::int32_t index,
                        std::size_t count,
                        std::string_view what) {
-  if (index >= 0 && static_cast<std::size_t>(index) < count) return "";
+  if (index >= 0 && static_cast<std::size_t>(index) < count) return {};
   return std::to_string(index) + " is not among the " + std::to_string(count) +
          " " + std::string(what);
 }
@@ -339,7 +339,7 @@ std::string PixelFault(const Eigen::Vector2d& z_px,
                        const CameraCalibration& camera,
                        double margin_px) {
   if (!z_px.allFinite()) return "is not finite";
-  if (IsInImage(camera, z_px, margin_px)) return "";
+  if (IsInImage(camera, z_px, margin_px)) return {};
   return "(" + Readable(z_px.x()) + ", " + Readable(z_px.y()) +
          ") is outside the image of " + std::to_string(camera.width_px) +
          " x " + std::to_string(camera.height_px) + " px";

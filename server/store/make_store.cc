@@ -81,7 +81,7 @@ class DatabaseStore final : public Store {
   }
 
   absl::StatusOr<StoredRig> GetRig(const std::string& rig) override {
-    return Read([&](Connection* db) { return ReadRig(db, rig); });
+    return ReadOne([&](Connection* db) { return ReadRig(db, rig); });
   }
 
   absl::StatusOr<std::map<std::string, StoredRig>> GetRigs(
@@ -219,7 +219,7 @@ class DatabaseStore final : public Store {
 
   absl::StatusOr<bool> WasActive(const std::string& rig,
                                  std::int64_t version) override {
-    return Read([&](Connection* db) {
+    return ReadOne([&](Connection* db) {
       return server::WasActive(db, rig, version);
     });
   }
@@ -390,6 +390,10 @@ class DatabaseStore final : public Store {
   template <typename Query>
   std::invoke_result_t<Query, Connection*> Read(const Query& query) {
     return ReadWith(&Database::Read, query);
+  }
+  template <typename Query>
+  std::invoke_result_t<Query, Connection*> ReadOne(const Query& query) {
+    return ReadWith(&Database::ReadOne, query);
   }
   template <typename Query>
   std::invoke_result_t<Query, Connection*> ReadForService(const Query& query) {

@@ -198,6 +198,7 @@ void Run(const Options& options) {
   std::fflush(stdout);
   const double busy = StreamAll(options, daemon->pid(), &devices);
   PrintDevices(options, devices);
+  std::fflush(stdout);
   devices.clear();
   std::this_thread::sleep_for(seconds(10));
   fmt::print(

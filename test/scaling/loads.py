@@ -15,7 +15,8 @@ import time
 import psycopg2
 from hub import processes
 
-from scaling.cpu import cpu_s
+from scaling import cores
+from scaling.cpu import children, cpu_s, own_cpu_s
 from scaling.daemon import Daemon
 from scaling.database import Server
 
@@ -126,10 +127,15 @@ def _send(
     )
     if "begin" not in clients.stdout.readline():
         raise processes.Failed("the clients have not begun")
+    pids = [*children(clients.pid), *(other.pid for other in others)]
     with contextlib.closing(server.connect("loaded")) as connection:
         usage = Usage(server, connection)
+        of_replicas = -sum(map(cpu_s, pids))
+        of_clients = -own_cpu_s(clients.pid)
         line = clients.stdout.readline()
         _, cpu, commits, log = usage.since()
+        of_clients += own_cpu_s(clients.pid)
+        of_replicas += sum(map(cpu_s, pids))
         found = re.search(r"(\d+) segments stored", line)
         if found is None or int(found[1]) == 0:
             raise processes.Failed(f"no segment was stored: {line}")
@@ -150,7 +156,9 @@ def _send(
         "scored": scored / stored,
         "commits": commits / stored,
         "log": log / stored,
-        "cpu_ms": 1e3 * cpu / stored,
+        "database_ms": 1e3 * cpu / stored,
+        "replicas_ms": 1e3 * of_replicas / stored,
+        "clients_ms": 1e3 * of_clients / stored,
         "copy": copy,
     }
 
@@ -217,9 +225,10 @@ def _write_directly(
     programs: dict,
     copy: _Copy,
     seconds: int,
-) -> float:
+) -> tuple[float, float]:
     """Segments per second that the database itself takes, one in a commit as
-    from the daemon, from as many connections as there were clients.
+    from the daemon, from as many connections as there were clients; and its CPU
+    time [ms] for each.
     """
     server.create_database("written")
     hub = Daemon(folder, programs["selfcald"], server.uri("written"), "other_1")
@@ -240,33 +249,50 @@ def _write_directly(
         )
         for rig in range(1, _CLIENTS + 1)
     ]
+    before = cpu_s(server.pid)
     for writer in writers:
         writer.start()
     count = sum(written.get(timeout=seconds + 60) for _ in writers)
     for writer in writers:
         writer.join()
+    cpu = cpu_s(server.pid) - before
     server.drop_database("written")
-    return count / seconds
+    return count / seconds, 1e3 * cpu / count
+
+
+def _compare(
+    folder: pathlib.Path, server: Server, programs: dict, seconds: int
+) -> None:
+    """Both sides in turns, for a minute of the machine affects both."""
+    for replicas in (1, 2, 3):
+        sent = _send(folder, server, programs, replicas, seconds)
+        direct, direct_ms = _write_directly(
+            folder, server, programs, sent["copy"], seconds
+        )
+        print(
+            f"replicas {replicas}: {sent['per_second']:8.1f} {direct:8.1f}  "
+            f"ratio {sent['per_second'] / direct:.2f}; CPU [ms] of the "
+            f"database {sent['database_ms']:.2f} {direct_ms:.2f}, of replicas "
+            f"{sent['replicas_ms']:.2f}, of clients {sent['clients_ms']:.2f}; "
+            f"scored {sent['scored']:.2f}, transactions {sent['commits']:.1f}, "
+            f"log {sent['log'] / 1e3:.0f} kB",
+            flush=True,
+        )
 
 
 def measure_throughput(
     folder: pathlib.Path, server: Server, programs: dict, seconds: int
 ) -> None:
-    """Both sides in turns, for a minute of the machine affects both."""
     print(
         f"{_CLIENTS} clients, {seconds} s: segments per second acknowledged, "
-        "and written to the database directly; for one acknowledged: share "
-        "scored meanwhile, transactions, log [kB], CPU of the database [ms]"
+        "and written to the database directly; for each of these segments, CPU "
+        "time of the database; for one acknowledged, the other figures",
+        flush=True,
     )
-    for replicas in (1, 2, 3):
-        sent = _send(folder, server, programs, replicas, seconds)
-        direct = _write_directly(
-            folder, server, programs, sent["copy"], seconds
-        )
-        print(
-            f"replicas {replicas}: {sent['per_second']:8.1f} {direct:8.1f}  "
-            f"ratio {sent['per_second'] / direct:.2f}; {sent['scored']:.2f} "
-            f"{sent['commits']:.1f} {sent['log'] / 1e3:.0f} "
-            f"{sent['cpu_ms']:.1f}",
-            flush=True,
-        )
+    print("all on the same cores:", flush=True)
+    _compare(folder, server, programs, seconds)
+    if not cores.can_be_divided():
+        return
+    print("the database on half of the cores, the others without:", flush=True)
+    with cores.divided(server.pid):
+        _compare(folder, server, programs, seconds)

@@ -200,6 +200,9 @@ class Database {
   virtual void BeginWrite(Work work, Done done) = 0;
   // Runs `query` on a single state of the database.
   virtual absl::Status Read(const Work& query) = 0;
+  // Read of a `query` that runs one statement, which sees a single state by
+  // itself: an engine that is a server needs no transaction for it.
+  virtual absl::Status ReadOne(const Work& query) { return Read(query); }
   // Read for the work of the daemon itself: it never waits for reads of
   // callers.
   virtual absl::Status ReadForService(const Work& query) { return Read(query); }

@@ -59,6 +59,14 @@ void SleepBeforeAttempt(int attempt) {
   std::this_thread::sleep_for(std::chrono::microseconds(delay_us(random)));
 }
 
+Database::Work InSnapshot(const Database::Work& query) {
+  return [&query](Connection* db) -> absl::Status {
+    const Snapshot snapshot(db);
+    SELFCAL_RETURN_IF_ERROR(snapshot.status());
+    return query(db);
+  };
+}
+
 std::string NewOrigin() {
   std::random_device random;
   return fmt::format("{:08x}{:08x}", random(), random());
@@ -169,11 +177,15 @@ void PostgresDatabase::RunWriter(Writer* writer) {
 }
 
 absl::Status PostgresDatabase::Read(const Work& query) {
+  return ReadWith(InSnapshot(query), &for_callers_);
+}
+
+absl::Status PostgresDatabase::ReadOne(const Work& query) {
   return ReadWith(query, &for_callers_);
 }
 
 absl::Status PostgresDatabase::ReadForService(const Work& query) {
-  return ReadWith(query, &for_service_);
+  return ReadWith(InSnapshot(query), &for_service_);
 }
 
 absl::Status PostgresDatabase::ReadWith(const Work& query, Readers* readers) {
@@ -184,15 +196,8 @@ absl::Status PostgresDatabase::ReadWith(const Work& query, Readers* readers) {
     connection = std::move(readers->idle.back());
     readers->idle.pop_back();
   }
-  const absl::Status status = CarryOut(
-      [&query](Connection* db) -> absl::Status {
-        const Snapshot snapshot(db);
-        SELFCAL_RETURN_IF_ERROR(snapshot.status());
-        return query(db);
-      },
-      true,
-      readers->settings,
-      &connection);
+  const absl::Status status =
+      CarryOut(query, true, readers->settings, &connection);
   {
     const std::lock_guard lock(readers->mutex);
     readers->idle.push_back(std::move(connection));

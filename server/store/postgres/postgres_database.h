@@ -51,6 +51,7 @@ class PostgresDatabase final : public Database {
   void BeginWrite(Work work, Done done) override;
   // UNAVAILABLE for a statement that takes too long.
   absl::Status Read(const Work& query) override;
+  absl::Status ReadOne(const Work& query) override;
   absl::Status ReadForService(const Work& query) override;
   absl::StatusOr<std::unique_ptr<Connection>> OpenReader() override;
   std::unique_ptr<Listener> Listen(const Listener::Heard& heard) override;
