@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { until } from './reader.mjs';
 
-const kPage = 50; // rows of a list across rigs
+const kPage = 50; // rows of a list
 
 const idOf = (name) => decodeURIComponent(name.slice(name.lastIndexOf('/') + 1));
 const rigOf = (item) => item.name.split('/')[1];

@@ -63,7 +63,7 @@ export const interactionTests = {
   },
 
   async 'of a long list only the rows in view are in the page'(r) {
-    await r.open('/', 'Rigs');
+    await r.open('/?page_size=500', 'Rigs');
     const { rigs } = await r.api('activity?page_size=1000&order_by=name');
     const last = rigs[rigs.length - 1].name.split('/').pop();
     const rows = r.page.locator('tbody tr[data-index]');
@@ -84,6 +84,27 @@ export const interactionTests = {
     await until('the last row', async () => (await focused(r)) === last);
     await r.page.keyboard.press('Enter');
     await r.heading(last);
+  },
+
+  async 'a list is read 50 items at a time, and continued on demand'(r) {
+    const read = [];
+    const note = (request) => {
+      const url = new URL(request.url());
+      if (url.pathname === '/api/v1/activity') read.push(url.searchParams.get('page_size'));
+    };
+    r.page.on('request', note);
+    await r.open('/', 'Rigs');
+    const { rigs } = await r.api('activity?page_size=1000&order_by=name');
+    const names = rigs.map((rig) => rig.name.split('/').pop());
+    assert.ok(names.length > 50 && names.length < 100, 'two pages are needed');
+    await r.rows((shown) => shown.join() === names.slice(0, 50).join());
+    // A part of a list is not sorted by the page.
+    assert.equal(await r.page.getByRole('button', { name: 'Active version' }).count(), 0);
+    assert.deepEqual([...new Set(read)], ['50']);
+    await r.page.getByRole('link', { name: 'Next rigs' }).click();
+    await r.rows((shown) => shown.join() === names.slice(50).join());
+    assert.equal(await r.page.getByRole('link', { name: 'Next rigs' }).count(), 0);
+    r.page.off('request', note);
   },
 
   async 'rigs with alarms are listed alone'(r) {

@@ -14,7 +14,7 @@ from scaling.daemon import Daemon
 from scaling.database import Server
 
 _LIMIT_MS = 50
-_PAGE = 500  # of the console and of the command line
+_PAGE = 500  # of the command line
 _WALK_S = 4  # to collect the tokens of later pages
 _COMPONENT = "cam0.focal.x"
 

@@ -9,10 +9,9 @@ import { DataTable, type Column, type OrderLink } from './table';
 
 type SortDirection = 'asc' | 'desc';
 
-// Items that are read at a time, unless the address has page_size.
-const kPageSize = '500';
-// The same for a list across rigs: the goal of 50 ms is for pages of this size.
-export const kPageSizeAcrossRigs = '50';
+// Items that are read at a time, unless the address has page_size: the goal of
+// 50 ms is for pages of this size.
+export const kPageSize = '50';
 
 interface Listing<R, T> {
   path: string;
@@ -21,7 +20,6 @@ interface Listing<R, T> {
   fixed?: Record<string, string>; // query parameters that are not in the address
   // Default of the query parameter order_by; without it the list has none.
   order?: [string, SortDirection];
-  pageSize?: string; // kPageSize unless it is set
   version: number;
   columns: Column<T>[]; // the first names the item
   next: string; // text of the link to the next page
@@ -93,7 +91,7 @@ export function ListPage<R extends { nextPageToken: string }, T extends object>(
     const value = address.get(key);
     if (value) query.set(key, value);
   }
-  query.set('page_size', address.get('page_size') ?? props.pageSize ?? kPageSize);
+  query.set('page_size', address.get('page_size') ?? kPageSize);
   if (props.order) {
     query.set('order_by', address.get('order_by') || props.order.join(' '));
   }

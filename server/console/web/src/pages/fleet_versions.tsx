@@ -2,7 +2,7 @@
 import { idOf, pageOf, rigOf } from '../api';
 import type { Calibration, ListCalibrationsResponse } from '../contract';
 import { RigChoice, kRigFilter, rigColumn } from '../fleet';
-import { ListPage, kPageSizeAcrossRigs } from '../list';
+import { ListPage } from '../list';
 import { Link } from '../parts';
 import type { Column } from '../table';
 import { kVersionDetails, versionColumn } from './calibrations';
@@ -29,7 +29,6 @@ export function FleetVersions(props: { version: number }) {
       items={(response: ListCalibrationsResponse) => response.calibrations}
       query={[kRigFilter]}
       fixed={{ view: 'BASIC' }}
-      pageSize={kPageSizeAcrossRigs}
       version={props.version}
       columns={kColumns}
       next="Older versions"

@@ -2,7 +2,7 @@ import { idOf, pageOf, rigOf, rigPath } from '../api';
 import type { ListRecalibrationsResponse, Recalibration, SolverReport } from '../contract';
 import { RigChoice, kRigFilter, rigColumn } from '../fleet';
 import { number, words } from '../format';
-import { ListPage, kPageSizeAcrossRigs } from '../list';
+import { ListPage } from '../list';
 import { Badge, Link, When } from '../parts';
 import type { Column } from '../table';
 
@@ -60,7 +60,6 @@ export function FleetRuns(props: { version: number }) {
       path="recalibrations"
       items={itemsOf}
       query={[kRigFilter]}
-      pageSize={kPageSizeAcrossRigs}
       version={props.version}
       columns={kColumnsAcrossRigs}
       next="Older runs"

@@ -5,7 +5,7 @@ import { idOf, rigOf, rigPath, type ApiError } from '../api';
 import type { GroupScore, ListRigsResponse, ListSegmentsResponse, Rig, Segment } from '../contract';
 import { RigChoice, kRigFilter, rigColumn } from '../fleet';
 import { bytes, number, words } from '../format';
-import { ListPage, kPageSizeAcrossRigs, orderOf } from '../list';
+import { ListPage, kPageSize, orderOf } from '../list';
 import { Badge, Choice, Link, SegmentLink, When } from '../parts';
 import { go, useAddress, useRead, withQuery } from '../state';
 import type { Column } from '../table';
@@ -215,7 +215,6 @@ function SegmentList(props: { rig: string; groups: string[]; version: number }) 
       query={rig ? ['filter'] : ['filter', kRigFilter]}
       fixed={{ view: 'BASIC' }}
       order={kNewestFirst}
-      pageSize={rig ? undefined : kPageSizeAcrossRigs}
       version={props.version}
       columns={shown}
       next="Next segments"
@@ -245,7 +244,7 @@ export function Segments(props: { rig: string; version: number }) {
 // together have the same.
 export function FleetSegments(props: { version: number }) {
   const filter = useAddress().searchParams.get(kRigFilter) ?? '';
-  const query = new URLSearchParams({ filter, page_size: kPageSizeAcrossRigs });
+  const query = new URLSearchParams({ filter, page_size: kPageSize });
   const rigs = useRead<ListRigsResponse>('rigs?' + query.toString());
   return <SegmentList {...props} rig="" groups={groupsOf(rigs.value?.rigs ?? [])} />;
 }
