@@ -12,6 +12,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
+import { bulkTests } from './bulk_tests.mjs';
 import { startDaemon, workerOf } from './daemon.mjs';
 import { fleetTests } from './fleet_tests.mjs';
 import { interactionTests } from './interaction_tests.mjs';
@@ -427,7 +428,7 @@ try {
   const reader = new Reader(await browser.newPage(), base, screenshots);
   const other = new Reader(await browser.newPage(), base, screenshots);
   const send = (args) => start(sendSegments, args);
-  const all = { ...interactionTests, ...tests, ...fleetTests, ...layoutTests };
+  const all = { ...interactionTests, ...tests, ...fleetTests, ...bulkTests, ...layoutTests };
   for (const [name, run] of Object.entries(all)) {
     console.log(name);
     await run(reader, other, daemon, send);

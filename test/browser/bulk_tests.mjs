@@ -1,0 +1,173 @@
+// Changes all rigs of a filter.
+import assert from 'node:assert/strict';
+import { until } from './reader.mjs';
+
+const queryOf = (query) => new URLSearchParams(query).toString();
+
+const kLabelled = ['phone-001', 'phone-002', 'tablet'];
+const kFilter = 'labels.batch = bulk';
+
+// Shows the rigs of the filter, and asks for a change of them.
+async function ask(r, button) {
+  for (const rig of kLabelled) {
+    const name = 'rigs/' + rig;
+    await r.change('PATCH', name + '?updateMask=labels', { name, labels: { batch: 'bulk' } });
+  }
+  await r.open('/?' + queryOf({ filter: kFilter }), 'Rigs');
+  await r.rows((names) => names.join() === kLabelled.join());
+  await r.page.getByRole('button', { name: button }).click();
+  const dialog = r.page.getByRole('dialog');
+  const namesIn = (table) =>
+    dialog.getByRole('region', { name: table }).locator('tbody th').allTextContents();
+  // Focuses the heading when it changes, so that a screen reader reads it.
+  const titled = async (name) => {
+    await dialog.getByRole('heading', { name, exact: true }).waitFor();
+    await until('the focus', () => r.page.evaluate(
+      (title) => document.activeElement.textContent === title, name));
+  };
+  const close = async () => {
+    await dialog.getByRole('button', { name: 'Close' }).click();
+    await dialog.waitFor({ state: 'detached' });
+  };
+  return { dialog, namesIn, titled, close };
+}
+
+export const bulkTests = {
+  async 'rigs of a filter are recalibrated, and a failure does not hold up the others'(r) {
+    await r.open('/', 'Rigs');
+    await r.rows((names) => names.length > 0);
+    assert.equal(await r.page.getByRole('button', { name: /these rigs/ }).count(), 0);
+    const { dialog, namesIn, titled, close } = await ask(r, 'Recalibrate these rigs');
+    await titled('Recalibrate 3 rigs?');
+    assert.deepEqual(await namesIn('Rigs to change'), kLabelled);
+    await r.picture('bulk-confirm');
+    await r.page.keyboard.press('Escape');
+    await dialog.waitFor({ state: 'detached' });
+
+    const before = (await r.api('rigs/tablet/recalibrations')).recalibrations.length;
+    await r.page.getByRole('button', { name: 'Recalibrate these rigs' }).click();
+    await dialog.getByLabel(/^also where the tables have not changed/).check();
+    r.expectProblems = true;
+    await dialog.getByRole('button', { name: 'Recalibrate', exact: true }).click();
+    await titled('Recalibrating 3 rigs: ended');
+    assert.equal(
+      await dialog.getByRole('status').textContent(), 'A run was started on 1 of 3 rigs.');
+    assert.deepEqual((await namesIn('Failed')).sort(), ['phone-001', 'phone-002']);
+    await dialog.getByText('the tables of rig phone-001 are empty').waitFor();
+    await r.picture('bulk-failed');
+    await close();
+    r.expectProblems = false;
+    await until('the end of the run', async () => {
+      const { recalibrations } = await r.api('rigs/tablet/recalibrations');
+      return recalibrations.length === before + 1 && recalibrations.every((run) => run.endTime);
+    });
+  },
+
+  async 'rigs of a filter are rolled back, and once alone'(r) {
+    const versions = async () => (await r.api('rigs/tablet/calibrations?view=BASIC')).calibrations;
+    const newest = (await versions()).find((c) =>
+      ['ACTIVE', 'SUPERSEDED', 'ROLLED_BACK'].includes(c.state));
+    await r.change('POST', newest.name + ':activate', { reason: 'the test begins with it' });
+    const earlier = (await versions()).filter((c) => Number(c.version) < Number(newest.version));
+    const before = earlier.find((c) => c.state === 'SUPERSEDED').version;
+
+    const { dialog, namesIn, titled, close } = await ask(r, 'Roll back these rigs');
+    await titled('Roll back 1 rig?');
+    assert.deepEqual(await namesIn('Rigs to change'), ['tablet']);
+    await dialog.getByText(`from version ${newest.version} to ${before}`).waitFor();
+    assert.deepEqual(await namesIn('Left out'), ['phone-001', 'phone-002']);
+    const confirm = dialog.getByRole('button', { name: 'Roll back', exact: true });
+    assert.ok(await confirm.isDisabled(), 'no reason is needed');
+    await dialog.getByLabel('Reason').fill('the batch is rolled back');
+    await r.picture('bulk-rollback');
+    await confirm.focus();
+    await r.page.keyboard.press('Enter');
+    await titled('Rolling back 1 rig: ended');
+    assert.equal(await dialog.getByRole('status').textContent(),
+      'The version before is active on 1 of 1 rig.');
+    await close();
+    assert.equal((await r.api('rigs/tablet/calibrations/active')).version, before);
+
+    const again = await ask(r, 'Roll back these rigs');
+    await again.titled('Roll back: no rig to change');
+    assert.deepEqual(await again.namesIn('Left out'), kLabelled);
+    await again.dialog.getByText(/^It is rolled back already/).waitFor();
+    await again.close();
+    await r.change('POST', newest.name + ':activate', { reason: 'the test ends with it' });
+    await r.shows('/rigs/tablet/events', 'Events of tablet', ['the batch is rolled back']);
+  },
+
+  async 'the device of a rig that it reports is instructed'(r) {
+    // As at a hub to which devices report two of the rigs.
+    const isActivity = (url) => url.pathname === '/api/v1/activity';
+    await r.page.route(isActivity, async (route) => {
+      const response = await route.fetch();
+      const listed = await response.json();
+      for (const rig of listed.rigs) {
+        if (rig.name.startsWith('rigs/phone-')) rig.device = { waiting: '0', programVersion: '1' };
+      }
+      await route.fulfill({ response, json: listed });
+    });
+    const given = [];
+    const isInstruction = (url) => url.pathname === '/api/v1/rigs/phone-001/instructions';
+    await r.page.route(isInstruction, async (route) => {
+      given.push(route.request().postDataJSON());
+      await route.fulfill({ json: { name: 'rigs/phone-001/instructions/1' } });
+    });
+    r.expectProblems = true;
+    const { dialog, namesIn, titled, close } = await ask(r, 'Recalibrate these rigs');
+    await dialog.getByText('2 of them are reported by a device').waitFor();
+    await dialog.getByRole('button', { name: 'Recalibrate', exact: true }).click();
+    await titled('Recalibrating 3 rigs: ended');
+    assert.deepEqual(given, [{ startRecalibration: { parent: 'rigs/phone-001', force: false } }]);
+    await dialog.getByText('Instructions were given to the devices of 1 rig').waitFor();
+    // This daemon understands the instruction, and knows of no device.
+    assert.ok((await namesIn('Failed')).includes('phone-002'));
+    await dialog.getByText('no device reports rig phone-002').waitFor();
+    await close();
+    await r.page.unroute(isActivity);
+    await r.page.unroute(isInstruction);
+    r.expectProblems = false;
+  },
+
+  async 'changes of many rigs can be stopped'(r) {
+    let release;
+    const released = new Promise((resolve) => {
+      release = resolve;
+    });
+    const isStart = (url) => /^\/api\/v1\/rigs\/phone-\d+\/recalibrations$/.test(url.pathname);
+    const error = { code: 'FAILED_PRECONDITION', message: 'it was held up', whatToDo: '' };
+    await r.page.route(isStart, async (route) => {
+      await released;
+      await route.fulfill({ status: 409, json: error });
+    });
+    r.expectProblems = true;
+    await r.open('/?' + queryOf({ filter: 'phone-' }), 'Rigs');
+    const rigs = (await r.api('activity?page_size=1000&filter=phone-')).rigs.length;
+    await r.page.getByRole('button', { name: 'Recalibrate these rigs' }).click();
+    const dialog = r.page.getByRole('dialog');
+    await dialog.getByRole('heading', { name: `Recalibrate ${rigs} rigs?` }).waitFor();
+    await dialog.getByRole('button', { name: 'Recalibrate', exact: true }).click();
+    await dialog.getByRole('button', { name: 'Stop' }).click();
+    release();
+    await dialog.getByText(/^A run was started on 0 of \d+ rigs\. Stopped before/).waitFor();
+    const failed = await dialog.getByRole('region', { name: 'Failed' }).locator('tbody th').count();
+    assert.ok(failed > 0 && failed < rigs, `${failed} of ${rigs} failed`);
+    await dialog.getByText(`Stopped before ${rigs - failed} rigs.`).waitFor();
+    await dialog.getByRole('button', { name: 'Close' }).click();
+    await r.page.unroute(isStart);
+    r.expectProblems = false;
+  },
+
+  async 'a caller who may only read is offered no changes'(r) {
+    const isCaller = (url) => url.pathname === '/api/v1/caller';
+    await r.page.route(isCaller, (route) => route.fulfill({
+      json: { name: 'reader', programVersion: '1', grants: [{ role: 'read', rig: '', label: '' }] },
+    }));
+    await r.open('/?' + queryOf({ filter: 'tab' }), 'Rigs');
+    await r.sees('as reader.');
+    await r.rows((names) => names.join() === 'tablet');
+    assert.equal(await r.page.getByRole('button', { name: /these rigs/ }).count(), 0);
+    await r.page.unroute(isCaller);
+  },
+};
