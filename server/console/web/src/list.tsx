@@ -3,6 +3,7 @@
 import type { ComponentChildren } from 'preact';
 import { useMemo } from 'preact/hooks';
 import type { ApiError } from './api';
+import { filterOf, type Menu } from './list_filter';
 import { Empty, Link, Loaded, Title } from './parts';
 import { useAddress, useRead, withQuery } from './state';
 import { DataTable, type Column, type OrderLink } from './table';
@@ -17,6 +18,7 @@ interface Listing<R, T> {
   path: string;
   items: (response: R) => T[];
   query?: string[]; // query parameters of the address that go to the daemon
+  menus?: Menu[]; // of the filter, if the list has that of list_filter.tsx
   fixed?: Record<string, string>; // query parameters that are not in the address
   // Default of the query parameter order_by; without it the list has none.
   order?: [string, SortDirection];
@@ -47,6 +49,13 @@ function linkOf(column: string, now: [string, SortDirection], first: SortDirecti
     to: withQuery({ order_by: `${column} ${next}`, page_token: '' }),
     sorted: !current ? 'none' : direction === 'asc' ? 'ascending' : 'descending',
   };
+}
+
+// States that the list lacks items in its order, if it does.
+function LeftOut<T>(props: { columns: Column<T>[]; order: string }) {
+  const sorted = props.columns.find(({ order }) => order === props.order);
+  if (!sorted?.partial) return null;
+  return <p class="quiet">Rows without a value in the sorted column are not listed.</p>;
 }
 
 // Links to the next page and to the first page.
@@ -91,6 +100,10 @@ export function ListPage<R extends { nextPageToken: string }, T extends object>(
     const value = address.get(key);
     if (value) query.set(key, value);
   }
+  if (props.menus) {
+    const filter = filterOf(address, props.menus);
+    if (filter) query.set('filter', filter);
+  }
   query.set('page_size', address.get('page_size') ?? kPageSize);
   if (props.order) {
     query.set('order_by', address.get('order_by') || props.order.join(' '));
@@ -102,6 +115,9 @@ export function ListPage<R extends { nextPageToken: string }, T extends object>(
     <>
       <Title text={props.title}>{props.title}</Title>
       {props.above?.(mistake)}
+      {props.order && !mistake && (
+        <LeftOut columns={props.columns} order={orderOf(address, props.order)[0]} />
+      )}
       {!mistake && (
         <Loaded read={read}>
           {(listed) => {

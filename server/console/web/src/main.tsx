@@ -18,7 +18,7 @@ import { Instructions } from './pages/instructions';
 import { RigPage } from './pages/rig';
 import { Rigs } from './pages/rigs';
 import { RunPage } from './pages/run';
-import { FleetRuns, Runs } from './pages/runs';
+import { Runs } from './pages/runs';
 import { SegmentPage } from './pages/segment';
 import { FleetSegments, Segments } from './pages/segments';
 import { SessionPage, Sessions } from './pages/session';
@@ -80,7 +80,7 @@ function FleetPage(props: { page: string; caller: Caller | null; version: number
   const { page, version } = props;
   if (page === 'segments') return <FleetSegments version={version} />;
   if (page === 'calibrations') return <FleetVersions version={version} />;
-  if (page === 'recalibrations') return <FleetRuns version={version} />;
+  if (page === 'recalibrations') return <Runs rig="" version={version} />;
   return <Rigs caller={props.caller} version={version} />;
 }
 

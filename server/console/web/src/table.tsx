@@ -32,6 +32,8 @@ export interface Column<T> {
   wide?: boolean; // long texts
   below?: ComponentChildren; // below the head
   order?: string; // its name in order_by, if the daemon sorts the list by it
+  // Not every item has a value; the daemon leaves out the others in this order.
+  partial?: boolean;
 }
 
 type Sorted = 'ascending' | 'descending' | 'none';

@@ -252,6 +252,7 @@ export const kVersionDetails: Column<Calibration>[] = [
     head: 'Created',
     cell: (c) => <When time={c.createTime} />,
     value: (c) => Date.parse(c.createTime ?? ''),
+    order: 'create_time',
   },
   {
     head: 'Segments',

@@ -1,9 +1,24 @@
 import { idOf, pageOf, rigOf, rigPath } from '../api';
-import type { ListRecalibrationsResponse, Recalibration, SolverReport } from '../contract';
-import { RigChoice, kRigFilter, rigColumn } from '../fleet';
+import {
+  Recalibration_State,
+  Recalibration_Trigger,
+  type ListRecalibrationsResponse,
+  type Recalibration,
+  type SolverReport,
+} from '../contract';
+import { kRigFilter, rigColumn } from '../fleet';
 import { number, words } from '../format';
 import { ListPage } from '../list';
+import {
+  ListFilter,
+  NoMatch,
+  isNarrowed,
+  valuesOf,
+  type FilterSyntax,
+  type Menu,
+} from '../list_filter';
 import { Badge, Link, When } from '../parts';
+import { useAddress } from '../state';
 import type { Column } from '../table';
 
 export function costs(solver: SolverReport): string {
@@ -28,6 +43,14 @@ const kDetails: Column<Recalibration>[] = [
     head: 'Created',
     cell: (run) => <When time={run.createTime} />,
     value: (run) => Date.parse(run.createTime ?? ''),
+    order: 'create_time',
+  },
+  {
+    head: 'Duration [s]',
+    cell: ({ createTime, endTime }) =>
+      createTime && endTime && number((Date.parse(endTime) - Date.parse(createTime)) / 1000),
+    order: 'duration',
+    partial: true,
   },
   {
     head: 'Segments',
@@ -52,38 +75,54 @@ const kColumnsAcrossRigs = [kRun, rigColumn((run: Recalibration) => rigOf(run.na
 
 const itemsOf = (response: ListRecalibrationsResponse) => response.recalibrations;
 
-// The runs of all rigs, or of those of a filter.
-export function FleetRuns(props: { version: number }) {
+const kMenus: Menu[] = [
+  { name: 'state', label: 'State', of: valuesOf(Recalibration_State) },
+  { name: 'trigger', label: 'Trigger', of: valuesOf(Recalibration_Trigger) },
+];
+
+const kSyntax: FilterSyntax = {
+  items: 'runs',
+  equal: [
+    ['state', kMenus[0].of.join(', ')],
+    ['trigger', kMenus[1].of.join(', ')],
+  ],
+  compared: [['create_time']],
+  examples: [
+    'state = FAILED',
+    'trigger = MANUAL AND state = SUCCEEDED',
+    'create_time >= 2026-11-21T04:00:00Z',
+  ],
+};
+
+function Nothing(props: { rig: string }) {
+  if (isNarrowed(useAddress().searchParams, kMenus)) return <NoMatch item="run" menus={kMenus} />;
+  if (!props.rig) return <p>None of these rigs has a run.</p>;
   return (
-    <ListPage
-      title="Runs"
-      path="recalibrations"
-      items={itemsOf}
-      query={[kRigFilter]}
-      version={props.version}
-      columns={kColumnsAcrossRigs}
-      next="Older runs"
-      empty="None of these rigs has a run."
-      above={(mistake) => <RigChoice mistake={mistake} />}
-    />
+    <p>
+      There are no runs yet. A run starts when the tables are full;{' '}
+      <code>selfcal run start {props.rig}</code> starts one manually.
+    </p>
   );
 }
 
+// The runs of one rig, or of those of a filter if `rig` is ''.
 export function Runs(props: { rig: string; version: number }) {
+  const { rig } = props;
   return (
     <ListPage
-      title={'Runs of ' + props.rig}
-      path={rigPath(props.rig) + '/recalibrations'}
+      title={rig ? 'Runs of ' + rig : 'Runs'}
+      path={rig ? rigPath(rig) + '/recalibrations' : 'recalibrations'}
       items={itemsOf}
+      query={rig ? [] : [kRigFilter]}
+      menus={kMenus}
+      order={['create_time', 'desc']}
       version={props.version}
-      columns={kColumns}
+      columns={rig ? kColumns : kColumnsAcrossRigs}
       next="Older runs"
-      empty={
-        <>
-          There are no runs yet. A run starts when the tables are full;{' '}
-          <code>selfcal run start {props.rig}</code> starts one manually.
-        </>
-      }
+      empty={<Nothing rig={rig} />}
+      above={(mistake) => (
+        <ListFilter mistake={mistake} acrossRigs={!rig} syntax={kSyntax} menus={kMenus} />
+      )}
     />
   );
 }

@@ -320,6 +320,18 @@ export function SegmentPage(props: {
                 segment.temperatureC === undefined
                   ? null
                   : ['Temperature', number(segment.temperatureC) + ' °C'],
+                segment.motion?.angularRate === undefined
+                  ? null
+                  : [
+                      'Angular rate (root mean square)',
+                      number(segment.motion.angularRate) + ' rad/s',
+                    ],
+                segment.motion?.acceleration === undefined
+                  ? null
+                  : [
+                      'Acceleration (root mean square)',
+                      number(segment.motion.acceleration) + ' m/s²',
+                    ],
               ]}
             />
             {segment.problem && <p class="warning">{segment.problem}</p>}

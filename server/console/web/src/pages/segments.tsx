@@ -1,12 +1,27 @@
 // The segments of a rig or of many rigs, filtered and sorted.
-import type { JSX } from 'preact';
-import { useEffect, useMemo, useState } from 'preact/hooks';
-import { idOf, rigOf, rigPath, type ApiError } from '../api';
-import type { GroupScore, ListRigsResponse, ListSegmentsResponse, Rig, Segment } from '../contract';
-import { RigChoice, kRigFilter, rigColumn } from '../fleet';
+import { useMemo } from 'preact/hooks';
+import { idOf, rigOf, rigPath } from '../api';
+import {
+  Segment_State,
+  TableExclusion_Cause,
+  type GroupScore,
+  type ListRigsResponse,
+  type ListSegmentsResponse,
+  type Rig,
+  type Segment,
+} from '../contract';
+import { kRigFilter, rigColumn } from '../fleet';
 import { bytes, number, words } from '../format';
-import { ListPage, kPageSize, orderOf } from '../list';
-import { Badge, Choice, Link, SegmentLink, When } from '../parts';
+import { ListPage, kPageSize } from '../list';
+import {
+  ListFilter,
+  NoMatch,
+  isNarrowed,
+  valuesOf,
+  type FilterSyntax,
+  type Menu,
+} from '../list_filter';
+import { Badge, Choice, SegmentLink, When } from '../parts';
 import { go, useAddress, useRead, withQuery } from '../state';
 import type { Column } from '../table';
 
@@ -15,12 +30,27 @@ function kept(segment: Segment): string {
   return tables.length > 0 ? tables.join(', ') : 'none';
 }
 
-// The columns, with the score for one group.
+// A number that not every segment has, by which the daemon sorts.
+function quantity(
+  head: string,
+  order: string,
+  of: (segment: Segment) => number | undefined,
+): Column<Segment> {
+  const show = (segment: Segment) => {
+    const value = of(segment);
+    return value === undefined ? '' : number(value);
+  };
+  return { head, cell: show, order, partial: true };
+}
+
+// The columns, with the score for one group. The daemon sorts the segments of all
+// rigs by fewer of them than those of one.
 function columns(group: string, acrossRigs: boolean): Column<Segment>[] {
   const of = (segment: Segment, show: (score: GroupScore) => string) => {
     const score = segment.scores.find((s) => s.group === group);
     return score ? show(score) : '';
   };
+  const ofOneRig = (order: string) => (acrossRigs ? undefined : order);
   return [
     {
       head: 'Segment',
@@ -48,24 +78,28 @@ function columns(group: string, acrossRigs: boolean): Column<Segment>[] {
       head: 'Gain [nat]',
       cell: (segment) => of(segment, (score) => number(score.gainNats)),
       order: 'gain.' + group,
+      partial: true,
     },
     {
       head: 'Entropy [nat]',
       cell: (segment) => of(segment, (score) => number(score.entropyNats, 4)),
-      order: 'entropy.' + group,
+      order: ofOneRig('entropy.' + group),
+      partial: true,
     },
-    { head: 'Landmarks', cell: (segment) => segment.landmarks, order: 'landmarks' },
-    { head: 'Observations', cell: (segment) => segment.observations, order: 'observations' },
+    { head: 'Landmarks', cell: (segment) => segment.landmarks, order: ofOneRig('landmarks') },
+    {
+      head: 'Observations',
+      cell: (segment) => segment.observations,
+      order: ofOneRig('observations'),
+    },
     {
       head: 'Reprojection error [px]',
       cell: (segment) => (segment.residuals ? number(segment.residuals.reprojectionRmsPx) : ''),
       value: (segment) => segment.residuals?.reprojectionRmsPx,
     },
-    {
-      head: 'Temperature [°C]',
-      cell: (segment) => (segment.temperatureC === undefined ? '' : number(segment.temperatureC)),
-      order: 'temperature_c',
-    },
+    quantity('Temperature [°C]', 'temperature_c', (segment) => segment.temperatureC),
+    quantity('Angular rate [rad/s]', 'angular_rate', (segment) => segment.motion?.angularRate),
+    quantity('Acceleration [m/s²]', 'acceleration', (segment) => segment.motion?.acceleration),
     {
       head: 'Data',
       cell: (segment) => (segment.hasData ? bytes(segment.payloadBytes) : 'dropped'),
@@ -74,117 +108,72 @@ function columns(group: string, acrossRigs: boolean): Column<Segment>[] {
   ];
 }
 
-function Help(props: { group: string }) {
-  const examples = [
-    'state = UNUSABLE',
-    `in_table = ${props.group} AND gain.${props.group} >= 2`,
-    'has_data = true AND landmarks < 40',
-    'receive_time >= 2026-11-21T04:00:00Z',
-  ];
-  return (
-    <details>
-      <summary>Filter syntax</summary>
-      <p>Conditions joined by AND; a segment has to meet all of them.</p>
-      <ul>
-        <li>
-          With <code>=</code>: <code>state</code> (STORED, SCORED or UNUSABLE), <code>session</code>
-          , <code>has_data</code> (true or false), <code>in_table</code> (a group).
-        </li>
-        <li>
-          With <code>=</code> <code>&lt;</code> <code>&lt;=</code> <code>&gt;</code>{' '}
-          <code>&gt;=</code>: <code>receive_time</code>, <code>calibration_version</code>,{' '}
-          <code>landmarks</code>, <code>observations</code>, <code>temperature_c</code>,{' '}
-          <code>gain.GROUP</code> and <code>entropy.GROUP</code>, where GROUP is a group.
-        </li>
-        <li>Enclose a value with spaces or other special characters in double quotes.</li>
-      </ul>
-      <p>
-        Examples:{' '}
-        {examples.map((example, i) => (
-          <>
-            {i > 0 && ', '}
-            <Link to={withQuery({ filter: example, page_token: '' })}>
-              <code>{example}</code>
-            </Link>
-          </>
-        ))}
-        .
-      </p>
-    </details>
-  );
+const kMenus: Menu[] = [
+  { name: 'state', label: 'State', of: valuesOf(Segment_State) },
+  { name: 'excluded', label: 'Exclusion', of: valuesOf(TableExclusion_Cause) },
+];
+
+// The filter, with examples for one group.
+function syntaxOf(group: string): FilterSyntax {
+  return {
+    items: 'segments',
+    equal: [
+      ['state', kMenus[0].of.join(', ')],
+      ['session'],
+      ['has_data', 'true or false'],
+      ['in_table', 'a group'],
+      ['excluded', kMenus[1].of.join(', ')],
+    ],
+    compared: [
+      ['receive_time'],
+      ['calibration_version'],
+      ['landmarks'],
+      ['observations'],
+      ['temperature_c', '°C'],
+      ['angular_rate', 'rad/s'],
+      ['acceleration', 'm/s²'],
+      ['gain.GROUP', 'nat'],
+      ['entropy.GROUP', 'nat'],
+    ],
+    note: 'GROUP is the name of a group.',
+    examples: [
+      'state = UNUSABLE',
+      `in_table = ${group} AND gain.${group} >= 2`,
+      'has_data = true AND landmarks < 40',
+      'receive_time >= 2026-11-21T04:00:00Z',
+      'angular_rate >= 0.5 AND acceleration < 2',
+    ],
+  };
 }
 
-function Filter(props: { mistake: ApiError | null; group: string; groups: string[] }) {
-  const address = useAddress().searchParams;
-  const filter = address.get('filter') ?? '';
-  const [draft, setDraft] = useState(filter);
-  useEffect(() => setDraft(filter), [filter]);
-  const show = (text: string) => go(withQuery({ filter: text.trim(), page_token: '' }));
-  const edit = (event: JSX.TargetedInputEvent<HTMLInputElement>) => {
-    setDraft(event.currentTarget.value);
-    if (event.currentTarget.value === '' && filter !== '') show('');
-  };
-  const submit = (event: JSX.TargetedSubmitEvent<HTMLFormElement>) => {
-    event.preventDefault();
-    show(draft);
-  };
-  // A list sorted by the score of a group is then sorted by that of the new group.
-  const choose = (group: string) =>
-    go(
-      withQuery({
-        group,
-        order_by: (address.get('order_by') ?? '').replace(/^(gain|entropy)\.\S+/, '$1.' + group),
-        page_token: '',
-      }),
-    );
+// Chooses the group whose scores are shown. A list sorted by the score of a group
+// is then sorted by that of the new group.
+function GroupChoice(props: { group: string; of: string[] }) {
+  const order = useAddress().searchParams.get('order_by') ?? '';
+  if (props.of.length === 0) return null;
   return (
-    <form role="search" onSubmit={submit}>
-      <div class="bar">
-        <label class="wide">
-          Filter
-          <input
-            type="search"
-            value={draft}
-            placeholder="all segments"
-            spellcheck={false}
-            aria-invalid={props.mistake !== null}
-            aria-describedby="filter-mistake"
-            onInput={edit}
-          />
-        </label>
-        <button type="submit">Show</button>
-        {props.groups.length > 0 && (
-          <Choice
-            label="Scores of"
-            value={props.group}
-            of={props.groups.map((name) => [name, name])}
-            onChoice={choose}
-          />
-        )}
-      </div>
-      <p id="filter-mistake" class="mistake" role="alert">
-        {props.mistake?.message}
-      </p>
-      <Help group={props.group} />
-    </form>
+    <Choice
+      label="Scores of"
+      value={props.group}
+      of={props.of.map((name) => [name, name])}
+      onChoice={(group) =>
+        go(
+          withQuery({
+            group,
+            order_by: order.replace(/^(gain|entropy)\.\S+/, '$1.' + group),
+            page_token: '',
+          }),
+        )
+      }
+    />
   );
 }
 
 const kNewestFirst: ['receive_time', 'desc'] = ['receive_time', 'desc'];
 
-// Fields that not every segment has.
-const kNotOfAll = /^(gain|entropy|temperature_c)\b/;
-
-function Nothing(props: { rig: string; filter: string; order: string }) {
-  if (props.filter || props.order !== kNewestFirst[0]) {
-    return (
-      <p>
-        No segment matches.{' '}
-        <Link to={withQuery({ filter: '', order_by: '', page_token: '' })}>
-          Show all, newest first
-        </Link>
-      </p>
-    );
+function Nothing(props: { rig: string }) {
+  if (isNarrowed(useAddress().searchParams, kMenus)) {
+    return <NoMatch item="segment" menus={kMenus} />;
   }
   if (!props.rig) return <p>None of these rigs has a segment.</p>;
   return (
@@ -205,32 +194,25 @@ function SegmentList(props: { rig: string; groups: string[]; version: number }) 
   const address = useAddress().searchParams;
   const { rig, groups } = props;
   const group = address.get('group') ?? groups[0] ?? '';
-  const [order] = orderOf(address, kNewestFirst);
   const shown = useMemo(() => columns(group, !rig), [group, rig]);
   return (
     <ListPage
       title={rig ? 'Segments of ' + rig : 'Segments'}
       path={rig ? rigPath(rig) + '/segments' : 'segments'}
       items={(response: ListSegmentsResponse) => response.segments}
-      query={rig ? ['filter'] : ['filter', kRigFilter]}
+      query={rig ? [] : [kRigFilter]}
+      menus={kMenus}
       fixed={{ view: 'BASIC' }}
       order={kNewestFirst}
       version={props.version}
       columns={shown}
       next="Next segments"
-      empty={<Nothing rig={rig} filter={address.get('filter') ?? ''} order={order} />}
-      above={(mistake) => {
-        const isOfRigs = mistake?.message.startsWith(kRigFilter) ?? false;
-        return (
-          <>
-            {!rig && <RigChoice mistake={isOfRigs ? mistake : null} />}
-            <Filter mistake={isOfRigs ? null : mistake} group={group} groups={groups} />
-            {kNotOfAll.test(order) && !mistake && (
-              <p class="quiet">Segments without a value in the sorted column are not listed.</p>
-            )}
-          </>
-        );
-      }}
+      empty={<Nothing rig={rig} />}
+      above={(mistake) => (
+        <ListFilter mistake={mistake} acrossRigs={!rig} syntax={syntaxOf(group)} menus={kMenus}>
+          <GroupChoice group={group} of={groups} />
+        </ListFilter>
+      )}
     />
   );
 }
