@@ -15,6 +15,7 @@ import { promisify } from 'node:util';
 import { bulkTests } from './bulk_tests.mjs';
 import { startDaemon, workerOf } from './daemon.mjs';
 import { fleetTests } from './fleet_tests.mjs';
+import { hubTests } from './hub_tests.mjs';
 import { interactionTests } from './interaction_tests.mjs';
 import { layoutTests } from './layout_tests.mjs';
 import { kPatience, Reader, until } from './reader.mjs';
@@ -428,7 +429,9 @@ try {
   const reader = new Reader(await browser.newPage(), base, screenshots);
   const other = new Reader(await browser.newPage(), base, screenshots);
   const send = (args) => start(sendSegments, args);
-  const all = { ...interactionTests, ...tests, ...fleetTests, ...bulkTests, ...layoutTests };
+  const all = {
+    ...interactionTests, ...tests, ...fleetTests, ...bulkTests, ...hubTests, ...layoutTests,
+  };
   for (const [name, run] of Object.entries(all)) {
     console.log(name);
     await run(reader, other, daemon, send);

@@ -8,7 +8,7 @@ const kLabelled = ['phone-001', 'phone-002', 'tablet'];
 const kFilter = 'labels.batch = bulk';
 
 // Shows the rigs of the filter, and asks for a change of them.
-async function ask(r, button) {
+export async function ask(r, button) {
   for (const rig of kLabelled) {
     const name = 'rigs/' + rig;
     await r.change('PATCH', name + '?updateMask=labels', { name, labels: { batch: 'bulk' } });
@@ -95,39 +95,6 @@ export const bulkTests = {
     await again.close();
     await r.change('POST', newest.name + ':activate', { reason: 'the test ends with it' });
     await r.shows('/rigs/tablet/events', 'Events of tablet', ['the batch is rolled back']);
-  },
-
-  async 'the device of a rig that it reports is instructed'(r) {
-    // As at a hub to which devices report two of the rigs.
-    const isActivity = (url) => url.pathname === '/api/v1/activity';
-    await r.page.route(isActivity, async (route) => {
-      const response = await route.fetch();
-      const listed = await response.json();
-      for (const rig of listed.rigs) {
-        if (rig.name.startsWith('rigs/phone-')) rig.device = { waiting: '0', programVersion: '1' };
-      }
-      await route.fulfill({ response, json: listed });
-    });
-    const given = [];
-    const isInstruction = (url) => url.pathname === '/api/v1/rigs/phone-001/instructions';
-    await r.page.route(isInstruction, async (route) => {
-      given.push(route.request().postDataJSON());
-      await route.fulfill({ json: { name: 'rigs/phone-001/instructions/1' } });
-    });
-    r.expectProblems = true;
-    const { dialog, namesIn, titled, close } = await ask(r, 'Recalibrate these rigs');
-    await dialog.getByText('2 of them are reported by a device').waitFor();
-    await dialog.getByRole('button', { name: 'Recalibrate', exact: true }).click();
-    await titled('Recalibrating 3 rigs: ended');
-    assert.deepEqual(given, [{ startRecalibration: { parent: 'rigs/phone-001', force: false } }]);
-    await dialog.getByText('Instructions were given to the devices of 1 rig').waitFor();
-    // This daemon understands the instruction, and knows of no device.
-    assert.ok((await namesIn('Failed')).includes('phone-002'));
-    await dialog.getByText('no device reports rig phone-002').waitFor();
-    await close();
-    await r.page.unroute(isActivity);
-    await r.page.unroute(isInstruction);
-    r.expectProblems = false;
   },
 
   async 'changes of many rigs can be stopped'(r) {

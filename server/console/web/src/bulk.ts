@@ -2,13 +2,12 @@
 // them. A rig that fails does not hold up the others.
 import { get, idOf, post } from './api';
 import type {
-  ActivateCalibrationRequest,
   Calibration,
   ListActivityResponse,
   ListCalibrationsResponse,
   RigActivity,
-  StartRecalibrationRequest,
 } from './contract';
+import { instruct, type InstructedCall } from './instruction';
 
 // The statement of the administrator who confirms the changes.
 export interface Statement {
@@ -18,12 +17,8 @@ export interface Statement {
 
 // A call of the API, and the same as an instruction for a device.
 interface Call {
-  path: string;
-  body: object;
-  instruction: {
-    activateCalibration?: ActivateCalibrationRequest;
-    startRecalibration?: StartRecalibrationRequest;
-  };
+  make: () => Promise<unknown>;
+  instruction: InstructedCall;
 }
 
 export interface RigChange {
@@ -125,10 +120,8 @@ export async function makeChanges(
   onMade: (change: RigChange, failure: string | null) => void,
 ): Promise<void> {
   await forEach(changes, signal, async (change) => {
-    const { path, body, instruction } = change.call(statement);
-    const made = change.isReported
-      ? post(change.rig + '/instructions', instruction)
-      : post(path, body);
+    const { make, instruction } = change.call(statement);
+    const made = change.isReported ? instruct(change.rig, instruction) : make();
     onMade(change, await made.then(() => null, textOf));
   });
 }
@@ -145,8 +138,7 @@ export const kRecalibrate: BulkAction = {
       effect: 'start a run',
       isReported: rig.device !== undefined,
       call: ({ force }) => ({
-        path: rig.name + '/recalibrations',
-        body: { force },
+        make: () => post(rig.name + '/recalibrations', { force }),
         instruction: { startRecalibration: { parent: rig.name, force } },
       }),
     }),
@@ -170,8 +162,7 @@ function rollbackOf(rig: RigActivity, versions: Calibration[]): RigChange | stri
     effect: `from version ${active} to ${idOf(name)}`,
     isReported: rig.device !== undefined,
     call: ({ reason }) => ({
-      path: name + ':activate',
-      body: { reason },
+      make: () => post(name + ':activate', { reason }),
       instruction: { activateCalibration: { name, reason } },
     }),
   };

@@ -1,10 +1,12 @@
 // Labels of a rig: NAME = VALUE, by which operators group and filter rigs.
 import { useState } from 'preact/hooks';
 import { ActionDialog } from './action';
-import { Failure, patch, rigPath } from './api';
-import type { Rig } from './contract';
+import { Failure } from './api';
+import type { Instruction, Rig } from './contract';
+import { instruct } from './instruction';
+import { updateRig } from './rig_update';
 
-type LabelMap = Record<string, string>;
+export type LabelMap = Record<string, string>;
 
 export function Labels(props: { of: LabelMap }) {
   const names = Object.keys(props.of).sort();
@@ -27,17 +29,24 @@ function textOf(labels: LabelMap): string {
     .join('');
 }
 
+// The lines that are not empty.
+export function linesOf(text: string): string[] {
+  return text
+    .split('\n')
+    .map((line) => line.trim())
+    .filter(Boolean);
+}
+
 // One label on each line; throws for a line that has none.
-function parse(text: string): LabelMap {
+export function parseLabels(text: string): LabelMap {
   const labels: LabelMap = {};
-  for (const line of text.split('\n')) {
-    if (line.trim() === '') continue;
+  for (const line of linesOf(text)) {
     const at = line.indexOf('=');
     const name = line.slice(0, at).trim();
     if (at < 0 || name === '') {
       throw new Failure({
         code: 'INVALID_ARGUMENT',
-        message: `'${line.trim()}' is not a label.`,
+        message: `'${line}' is not a label.`,
         whatToDo: 'Write one label on each line, as site = lab.',
       });
     }
@@ -46,11 +55,20 @@ function parse(text: string): LabelMap {
   return labels;
 }
 
-export function EditLabels(props: { rig: string; of: Rig; onEnd: () => void }) {
+// The device of the rig is instructed if one reports it.
+export function EditLabels(props: {
+  rig: string;
+  of: Rig;
+  isReported: boolean;
+  onGiven: (instruction: Instruction) => void;
+  onEnd: () => void;
+}) {
+  const { name } = props.of;
   const [text, setText] = useState(textOf(props.of.labels));
   const act = async () => {
-    const labels = parse(text);
-    await patch(rigPath(props.rig) + '?updateMask=labels', { name: props.of.name, labels });
+    const update = { rig: { name, labels: parseLabels(text) }, updateMask: 'labels' };
+    if (props.isReported) props.onGiven(await instruct(name, { updateRig: update }));
+    else await updateRig(update);
   };
   return (
     <ActionDialog

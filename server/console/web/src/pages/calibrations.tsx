@@ -1,11 +1,12 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { ActionDialog, mayAdminister } from '../action';
-import { idOf, pageOf, post, rigPath } from '../api';
+import { idOf, pageOf, post, rigOf, rigPath } from '../api';
 import { Comparison } from '../comparison';
 import type {
   Calibration,
   Caller,
   ComponentEstimate,
+  Instruction,
   ListCalibrationsResponse,
   NoiseFactor,
   SegmentFit,
@@ -14,6 +15,7 @@ import type {
 } from '../contract';
 import { component, heading, number, shown, sigmaText, valueText, words } from '../format';
 import { History } from '../history';
+import { Given, instruct, useActivity } from '../instruction';
 import {
   Badge,
   Figures,
@@ -30,22 +32,38 @@ import {
 import { useAddress, useRead } from '../state';
 import { DataTable, type Column } from '../table';
 
-function Activate(props: { calibration: Calibration; active: string; onEnd: () => void }) {
-  const { calibration } = props;
+// The device of the rig is instructed if one reports it.
+function Activate(props: {
+  calibration: Calibration;
+  active: string;
+  isReported: boolean;
+  onGiven: (instruction: Instruction) => void;
+  onEnd: () => void;
+}) {
+  const { calibration, isReported } = props;
+  const { name } = calibration;
   const back = Number(calibration.version) < Number(props.active);
   return (
     <ActionDialog
       title={`${back ? 'Roll back to' : 'Activate'} version ${calibration.version}?`}
       button={back ? 'Roll back' : 'Activate'}
       act={async (reason) => {
-        await post(calibration.name + ':activate', { reason });
+        if (!isReported) await post(name + ':activate', { reason });
+        else props.onGiven(await instruct(rigOf(name), { activateCalibration: { name, reason } }));
       }}
       onEnd={props.onEnd}
     >
-      <p>
-        Every device that watches this rig receives it at once, and uses it in place of version{' '}
-        {props.active}. The event log records the reason.
-      </p>
+      {isReported ? (
+        <p>
+          A device reports this rig: it gets an instruction, and uses the version in place of
+          version {props.active} with its next report. Its event log records the reason.
+        </p>
+      ) : (
+        <p>
+          Every device that watches this rig receives it at once, and uses it in place of version{' '}
+          {props.active}. The event log records the reason.
+        </p>
+      )}
     </ActionDialog>
   );
 }
@@ -308,9 +326,11 @@ export function Calibrations(props: { rig: string; caller: Caller | null; versio
   const url = useAddress();
   const shown = /\/calibrations\/(\d+)$/.exec(url.pathname)?.[1];
   const [asked, setAsked] = useState<Calibration | null>(null);
+  const [given, setGiven] = useState<Instruction | null>(null);
   const [changed, setChanged] = useState(0);
   const base = rigPath(props.rig) + '/calibrations';
   const read = useRead<ListCalibrationsResponse>(base + '?page_size=100', props.version + changed);
+  const activity = useActivity(props.rig, props.version);
   const title = 'Calibrations of ' + props.rig;
   const may = mayAdminister(props.caller, 'rigs/' + props.rig);
   return (
@@ -322,6 +342,7 @@ export function Calibrations(props: { rig: string; caller: Caller | null; versio
           const one = calibrations.find((c) => c.version === shown);
           return (
             <>
+              {given && <Given of={given} />}
               {nextPageToken && <p class="quiet">The newest {calibrations.length} versions.</p>}
               <Versions
                 of={calibrations}
@@ -342,14 +363,20 @@ export function Calibrations(props: { rig: string; caller: Caller | null; versio
               <History of={calibrations} />
               <Comparison rig={props.rig} of={calibrations} />
               {asked && (
-                <Activate
-                  calibration={asked}
-                  active={active}
-                  onEnd={() => {
-                    setAsked(null);
-                    setChanged((count) => count + 1);
-                  }}
-                />
+                <Loaded read={activity}>
+                  {({ rigs: [found] }) => (
+                    <Activate
+                      calibration={asked}
+                      active={active}
+                      isReported={found?.device !== undefined}
+                      onGiven={setGiven}
+                      onEnd={() => {
+                        setAsked(null);
+                        setChanged((count) => count + 1);
+                      }}
+                    />
+                  )}
+                </Loaded>
               )}
             </>
           );

@@ -4,7 +4,7 @@ import { idOf, remove, rigPath } from '../api';
 import type {
   Calibration,
   Caller,
-  ListActivityResponse,
+  Instruction,
   ListSegmentsResponse,
   ListTablesResponse,
   Rig,
@@ -14,6 +14,7 @@ import type {
 } from '../contract';
 import { number } from '../format';
 import { Histogram } from '../histogram';
+import { Given, useActivity } from '../instruction';
 import { EditLabels, Labels } from '../labels';
 import { Certainty, knownOf } from '../parameters';
 import { Choice, Empty, Loaded, Meter, Problem, SegmentLink, Title } from '../parts';
@@ -158,39 +159,61 @@ function Delete(props: { rig: string; onEnd: () => void }) {
 }
 
 // What an administrator may change here.
-function Administration(props: { rig: string; of: Rig; onChange: () => void }) {
+function Administration(props: {
+  rig: string;
+  of: Rig;
+  isReported: boolean;
+  onChange: () => void;
+}) {
   const [asked, setAsked] = useState<'labels' | 'delete' | null>(null);
+  const [given, setGiven] = useState<Instruction | null>(null);
   return (
-    <p class="buttons">
-      <button type="button" onClick={() => setAsked('labels')}>
-        Edit labels
-      </button>
-      <button type="button" onClick={() => setAsked('delete')}>
-        Delete rig
-      </button>
-      {asked === 'labels' && (
-        <EditLabels
-          rig={props.rig}
-          of={props.of}
-          onEnd={() => {
-            setAsked(null);
-            props.onChange();
-          }}
-        />
-      )}
-      {asked === 'delete' && <Delete rig={props.rig} onEnd={() => setAsked(null)} />}
-    </p>
+    <>
+      {given && <Given of={given} />}
+      <p class="buttons">
+        <button type="button" onClick={() => setAsked('labels')}>
+          Edit labels
+        </button>
+        <button type="button" onClick={() => setAsked('delete')}>
+          Delete rig
+        </button>
+        {asked === 'labels' && (
+          <EditLabels
+            rig={props.rig}
+            of={props.of}
+            isReported={props.isReported}
+            onGiven={setGiven}
+            onEnd={() => {
+              setAsked(null);
+              props.onChange();
+            }}
+          />
+        )}
+        {asked === 'delete' && <Delete rig={props.rig} onEnd={() => setAsked(null)} />}
+      </p>
+    </>
   );
 }
 
 // Labels, and what an administrator may change.
-function Settings(props: { rig: string; of: Rig; caller: Caller | null; onChange: () => void }) {
+function Settings(props: {
+  rig: string;
+  of: Rig;
+  isReported: boolean;
+  caller: Caller | null;
+  onChange: () => void;
+}) {
   return (
     <section>
       <h2>Labels</h2>
       <Labels of={props.of.labels} />
       {mayAdminister(props.caller, props.of.name) && (
-        <Administration rig={props.rig} of={props.of} onChange={props.onChange} />
+        <Administration
+          rig={props.rig}
+          of={props.of}
+          isReported={props.isReported}
+          onChange={props.onChange}
+        />
       )}
     </section>
   );
@@ -203,9 +226,7 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
   const active = useRead<Calibration>(base + '/calibrations/active', props.version);
   const factory = useRead<Calibration>(base + '/calibrations/1');
   const tables = useRead<ListTablesResponse>(base + '/tables', props.version);
-  const filter = new URLSearchParams({ filter: `name = "${props.rig}"` });
-  const activities = useRead<ListActivityResponse>(`activity?${filter}`, props.version);
-  const activity = activities.value?.rigs[0];
+  const activity = useActivity(props.rig, props.version).value?.rigs[0];
   const known = useMemo(
     () => (active.value && factory.value ? knownOf(active.value, factory.value) : null),
     [active.value, factory.value],
@@ -261,6 +282,7 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
           <Settings
             rig={props.rig}
             of={rig.value}
+            isReported={activity?.device !== undefined}
             caller={props.caller}
             onChange={() => setChanged(changed + 1)}
           />

@@ -1,0 +1,91 @@
+// Changes rigs that devices report to a hub, which instructs the devices.
+import assert from 'node:assert/strict';
+import { ask } from './bulk_tests.mjs';
+
+// Shows the pages as at a hub to which devices report the rigs whose names begin
+// so, and takes the instructions for `rig`.
+async function asHub(r, prefix, rig) {
+  const isActivity = (url) => url.pathname === '/api/v1/activity';
+  await r.page.route(isActivity, async (route) => {
+    const response = await route.fetch();
+    const listed = await response.json();
+    for (const each of listed.rigs) {
+      if (each.name.startsWith('rigs/' + prefix)) {
+        each.device = { waiting: '0', programVersion: '1' };
+      }
+    }
+    await route.fulfill({ response, json: listed });
+  });
+  const given = [];
+  const isInstruction = (url) => url.pathname === `/api/v1/rigs/${rig}/instructions`;
+  await r.page.route(isInstruction, async (route) => {
+    given.push(route.request().postDataJSON());
+    await route.fulfill({ json: { name: `rigs/${rig}/instructions/7` } });
+  });
+  const end = async () => {
+    await r.page.unroute(isActivity);
+    await r.page.unroute(isInstruction);
+  };
+  return { given, end };
+}
+
+// Until the page says that an instruction was given.
+async function seesGiven(r, rig) {
+  const note = r.page.getByRole('status').filter({ hasText: `Instruction 7 was given to the device of rig ${rig},` });
+  const link = note.getByRole('link', { name: 'Instructions' });
+  assert.equal(await link.getAttribute('href'), `/rigs/${rig}/instructions`);
+}
+
+export const hubTests = {
+  async 'the device of a rig that it reports is instructed'(r) {
+    const { given, end } = await asHub(r, 'phone-', 'phone-001');
+    r.expectProblems = true;
+    const { dialog, namesIn, titled, close } = await ask(r, 'Recalibrate these rigs');
+    await dialog.getByText('2 of them are reported by a device').waitFor();
+    await dialog.getByRole('button', { name: 'Recalibrate', exact: true }).click();
+    await titled('Recalibrating 3 rigs: ended');
+    assert.deepEqual(given, [{ startRecalibration: { parent: 'rigs/phone-001', force: false } }]);
+    await dialog.getByText('Instructions were given to the devices of 1 rig').waitFor();
+    // This daemon understands the instruction, and knows of no device.
+    assert.ok((await namesIn('Failed')).includes('phone-002'));
+    await dialog.getByText('no device reports rig phone-002').waitFor();
+    await close();
+    await end();
+    r.expectProblems = false;
+  },
+
+  async 'a version of a rig that a device reports is activated by the device'(r) {
+    const { version } = await r.api('rigs/tablet/calibrations/active');
+    const { given, end } = await asHub(r, 'tablet', 'tablet');
+    await r.open('/rigs/tablet/calibrations', 'Calibrations of tablet');
+    await r.page.getByRole('button', { name: /Roll back|Activate/ }).last().click();
+    const dialog = r.page.getByRole('dialog');
+    await dialog.getByText('it gets an instruction').waitFor();
+    await dialog.getByLabel('Reason').fill('the hub asks for it');
+    await dialog.getByRole('button', { name: /Roll back|Activate/ }).click();
+    await dialog.waitFor({ state: 'detached' });
+    await seesGiven(r, 'tablet');
+    await r.picture('activate-at-hub');
+    assert.equal(given.length, 1);
+    const { name, reason } = given[0].activateCalibration;
+    assert.match(name, /^rigs\/tablet\/calibrations\/\d+$/);
+    assert.equal(reason, 'the hub asks for it');
+    assert.equal((await r.api('rigs/tablet/calibrations/active')).version, version);
+    await end();
+  },
+
+  async 'labels of a rig that a device reports are changed by the device'(r) {
+    const { labels } = await r.api('rigs/tablet');
+    const { given, end } = await asHub(r, 'tablet', 'tablet');
+    await r.open('/rigs/tablet', 'tablet');
+    await r.sees('Last report of the device');
+    await r.page.getByRole('button', { name: 'Edit labels' }).click();
+    await r.page.getByRole('dialog').getByRole('textbox').fill('site = hub');
+    await r.page.getByRole('button', { name: 'Save' }).click();
+    await seesGiven(r, 'tablet');
+    const rig = { name: 'rigs/tablet', labels: { site: 'hub' } };
+    assert.deepEqual(given, [{ updateRig: { rig, updateMask: 'labels' } }]);
+    assert.deepEqual((await r.api('rigs/tablet')).labels, labels);
+    await end();
+  },
+};
