@@ -32,6 +32,13 @@ export async function ask(r, button) {
   return { dialog, namesIn, titled, close };
 }
 
+// The changes that the dialog lists, by rig.
+async function changesIn(dialog) {
+  const rows = dialog.getByRole('region', { name: 'Rigs to change' }).locator('tbody tr');
+  return Object.fromEntries(await rows.evaluateAll((all) =>
+    all.map((row) => [...row.children].slice(0, 2).map((cell) => cell.textContent))));
+}
+
 export const bulkTests = {
   async 'rigs of a filter are recalibrated, and a failure does not hold up the others'(r) {
     await r.open('/', 'Rigs');
@@ -95,6 +102,90 @@ export const bulkTests = {
     await again.close();
     await r.change('POST', newest.name + ':activate', { reason: 'the test ends with it' });
     await r.shows('/rigs/tablet/events', 'Events of tablet', ['the batch is rolled back']);
+  },
+
+  async 'rigs of a filter are labelled, and their other labels stay'(r) {
+    const label = (rig, labels) => {
+      const name = 'rigs/' + rig;
+      return r.change('PATCH', name + '?updateMask=labels', { name, labels });
+    };
+    const labelsOf = async (rig) => (await r.api('rigs/' + rig)).labels;
+    const { dialog, namesIn, titled, close } = await ask(r, 'Label these rigs');
+    await label('phone-001', { batch: 'bulk', site: 'lab' });
+    await label('tablet', { batch: 'bulk', site: 'north', owner: 'me' });
+    const go = dialog.getByRole('button', { name: 'Continue' });
+    await go.click();
+    await dialog.getByRole('alert').getByText('There is nothing to change').waitFor();
+    const set = dialog.getByLabel(/^Labels to set/);
+    await set.fill('nonsense');
+    await go.click();
+    await dialog.getByRole('alert').getByText("'nonsense' is not a label").waitFor();
+    await set.fill('site = lab');
+    await dialog.getByLabel(/^Labels to remove/).fill('owner\n');
+    await r.picture('bulk-labels');
+    await go.click();
+    await titled('Label 2 rigs?');
+    assert.deepEqual(await changesIn(dialog), {
+      'phone-002': 'site = lab',
+      tablet: 'site = lab (now north), without owner',
+    });
+    assert.deepEqual(await namesIn('Left out'), ['phone-001']);
+    assert.deepEqual(await labelsOf('phone-002'), { batch: 'bulk' }, 'changed without consent');
+    await dialog.getByRole('button', { name: 'Label', exact: true }).click();
+    await titled('Labelling 2 rigs: ended');
+    assert.equal(
+      await dialog.getByRole('status').textContent(), 'The labels were changed on 2 of 2 rigs.');
+    await close();
+    for (const rig of kLabelled) {
+      assert.deepEqual(await labelsOf(rig), { batch: 'bulk', site: 'lab' });
+    }
+  },
+
+  async 'rigs of a filter are configured, and a refusal does not hold up the others'(r) {
+    const settings = {
+      calibrationMaxAge: '604800s', recalibrationMinInterval: '43200s', retriggerFraction: 0.75,
+    };
+    const configure = (rig, values) => {
+      const name = 'rigs/' + rig;
+      return r.change('PATCH', `${name}?updateMask=${Object.keys(settings)}`, { name, ...values });
+    };
+    const before = await r.api('rigs/tablet');
+    const { dialog, namesIn, titled, close } = await ask(r, 'Configure these rigs');
+    await configure('phone-001', settings);
+    const fill = (name, text) => dialog.getByLabel(name).fill(text);
+    const go = dialog.getByRole('button', { name: 'Continue' });
+    await fill('calibration_max_age', '1 week');
+    await go.click();
+    await dialog.getByRole('alert').getByText("'1 week' is not a value").waitFor();
+    await fill('calibration_max_age', '7 d');
+    await fill('recalibration_min_interval', '12 h');
+    await fill('retrigger_fraction', '0.75');
+    await r.picture('bulk-settings');
+    await go.click();
+    await titled('Configure 2 rigs?');
+    const change = 'recalibration_min_interval: none to 12 h, calibration_max_age: none to 7 d, ' +
+      'retrigger_fraction: 0.5 to 0.75';
+    assert.deepEqual(await changesIn(dialog), { 'phone-002': change, tablet: change });
+    assert.deepEqual(await namesIn('Left out'), ['phone-001']);
+    // As for a caller without a role on one of the rigs.
+    const isRefused = (url) => url.pathname === '/api/v1/rigs/phone-002';
+    const error = { code: 'PERMISSION_DENIED', message: 'that is not yours', whatToDo: '' };
+    await r.page.route(isRefused, (route) => route.fulfill({ status: 403, json: error }));
+    r.expectProblems = true;
+    await dialog.getByRole('button', { name: 'Configure', exact: true }).click();
+    await titled('Configuring 2 rigs: ended');
+    assert.equal(
+      await dialog.getByRole('status').textContent(), 'The settings were changed on 1 of 2 rigs.');
+    assert.deepEqual(await namesIn('Failed'), ['phone-002']);
+    await dialog.getByText('that is not yours').waitFor();
+    await close();
+    await r.page.unroute(isRefused);
+    r.expectProblems = false;
+    // Nothing but these settings has changed.
+    const after = await r.api('rigs/tablet');
+    assert.deepEqual(after, { ...before, labels: after.labels, ...settings });
+    for (const rig of ['phone-001', 'tablet']) await configure(rig, {});
+    assert.deepEqual(await r.api('rigs/tablet'), { ...before, labels: after.labels });
   },
 
   async 'changes of many rigs can be stopped'(r) {

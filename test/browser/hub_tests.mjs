@@ -54,6 +54,37 @@ export const hubTests = {
     r.expectProblems = false;
   },
 
+  async 'devices are instructed to change labels and settings'(r) {
+    const { given, end } = await asHub(r, 'phone-', 'phone-001');
+    r.expectProblems = true;
+    const change = async (name, fill) => {
+      const { dialog, namesIn, titled, close } = await ask(r, name + ' these rigs');
+      await fill(dialog);
+      await dialog.getByRole('button', { name: 'Continue' }).click();
+      await titled(name + ' 3 rigs?');
+      await dialog.getByText('2 of them are reported by a device').waitFor();
+      await dialog.getByRole('button', { name, exact: true }).click();
+      await dialog.getByText('Instructions were given to the devices of 1 rig').waitFor();
+      // This daemon understands the instruction, and knows of no device.
+      assert.deepEqual(await namesIn('Failed'), ['phone-002']);
+      await dialog.getByText('no device reports rig phone-002').waitFor();
+      await close();
+    };
+    await change('Label', (dialog) => dialog.getByLabel(/^Labels to set/).fill('site = lab'));
+    await change('Configure', (dialog) => dialog.getByLabel('table_max_age').fill('30 d'));
+    const name = 'rigs/phone-001';
+    assert.deepEqual(given, [
+      { updateRig: { rig: { name, labels: { batch: 'bulk', site: 'lab' } }, updateMask: 'labels' } },
+      { updateRig: { rig: { name, tableMaxAge: '2592000s' }, updateMask: 'tableMaxAge' } },
+    ]);
+    // The hub changes nothing of a rig that a device reports, but its own rig.
+    assert.equal((await r.api('rigs/phone-001')).tableMaxAge, undefined);
+    assert.equal((await r.api('rigs/tablet')).tableMaxAge, '2592000s');
+    await r.change('PATCH', 'rigs/tablet?updateMask=tableMaxAge', { name: 'rigs/tablet' });
+    await end();
+    r.expectProblems = false;
+  },
+
   async 'a version of a rig that a device reports is activated by the device'(r) {
     const { version } = await r.api('rigs/tablet/calibrations/active');
     const { given, end } = await asHub(r, 'tablet', 'tablet');

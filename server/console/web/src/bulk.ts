@@ -44,7 +44,7 @@ export interface BulkAction {
   progressive: string; // Rolling back
   result: string; // The version before is active
   explanation: string;
-  takes: 'reason' | 'force'; // the part of the statement that it uses
+  takes: 'reason' | 'force' | 'nothing'; // the part of the statement that it uses
   // The change of a rig, or why it is left out.
   plan: (rig: RigActivity, signal: AbortSignal) => Promise<RigChange | string>;
 }

@@ -40,6 +40,28 @@ export function ago(time: string | undefined): string {
   return time;
 }
 
+const kSeconds: [number, string][] = [
+  [86400, 'd'],
+  [3600, 'h'],
+  [60, 'min'],
+  [1, 's'],
+];
+
+// 30 d; 'none' for a time of 0, which a rig does not limit.
+export function durationText(seconds: number): string {
+  if (seconds === 0) return 'none';
+  const [size, unit] = kSeconds.find(([size]) => seconds % size === 0) ?? [1, 's'];
+  return `${seconds / size} ${unit}`;
+}
+
+// The seconds of a text as 12 h, to the millisecond; null if it is not a time.
+export function secondsOf(text: string): number | null {
+  if (/^\s*0\s*$/.test(text)) return 0;
+  const [, value, unit] = /^\s*(\d+(?:\.\d+)?)\s*([a-z]+)\s*$/.exec(text) ?? [];
+  const size = kSeconds.find(([, name]) => name === unit)?.[0];
+  return size === undefined ? null : Math.round(1000 * size * Number(value)) / 1000;
+}
+
 export function clock(time: string | undefined): string {
   return time ? time.replace('T', ' ').replace(/\.\d+Z$|Z$/, ' UTC') : '';
 }

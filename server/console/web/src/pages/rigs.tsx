@@ -3,6 +3,7 @@ import { mayAdminister } from '../action';
 import { idOf, pageOf } from '../api';
 import { kRecalibrate, kRollBack, type BulkAction } from '../bulk';
 import { BulkDialog } from '../bulk_dialog';
+import { kConfigure, kLabel, type BulkForm } from '../bulk_forms';
 import type { Caller, ListActivityResponse, ReportState, RigActivity } from '../contract';
 import { RigFilter } from '../fleet';
 import { Labels } from '../labels';
@@ -92,9 +93,22 @@ function Nothing(props: { filter: string; withAlarms: boolean }) {
   );
 }
 
+// What an administrator may change: by an action, or by one that a form makes.
+const kOffers: (BulkAction | BulkForm)[] = [kRecalibrate, kRollBack, kLabel, kConfigure];
+
 interface Asked {
-  action: BulkAction;
-  query: Record<string, string>;
+  offer: BulkAction | BulkForm;
+  query: Record<string, string>; // of the list of rigs
+}
+
+function AskedDialog(props: {
+  of: Asked;
+  onAction: (action: BulkAction) => void;
+  onEnd: () => void;
+}) {
+  const { offer, query } = props.of;
+  if ('Form' in offer) return <offer.Form onAction={props.onAction} onEnd={props.onEnd} />;
+  return <BulkDialog action={offer} query={query} onEnd={props.onEnd} />;
 }
 
 // The changes of all rigs that the filter finds, for an administrator.
@@ -103,12 +117,18 @@ function Administration(props: { filter: string; withAlarms: boolean }) {
   const query = { filter: props.filter, with_alarms: String(props.withAlarms) };
   return (
     <p class="buttons">
-      {[kRecalibrate, kRollBack].map((action) => (
-        <button key={action.imperative} type="button" onClick={() => setAsked({ action, query })}>
-          {action.imperative} these rigs
+      {kOffers.map((offer) => (
+        <button key={offer.imperative} type="button" onClick={() => setAsked({ offer, query })}>
+          {offer.imperative} these rigs
         </button>
       ))}
-      {asked && <BulkDialog {...asked} onEnd={() => setAsked(null)} />}
+      {asked && (
+        <AskedDialog
+          of={asked}
+          onAction={(action) => setAsked({ ...asked, offer: action })}
+          onEnd={() => setAsked(null)}
+        />
+      )}
     </p>
   );
 }
