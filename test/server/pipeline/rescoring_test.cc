@@ -54,7 +54,8 @@ class RescoringTest : public PipelineTest {
           stored.rig.prior_sigmas.push_back({"imu.gyro.scale.*", 0.5});
           return stored;
         },
-        "eve");
+        "eve",
+        "");
     ASSERT_TRUE(updated.ok()) << updated.status();
   }
 

@@ -218,7 +218,7 @@ TEST_F(FleetReadersTest, AFunctionOfTheReaderSeesNoOtherRig) {
      "LANGUAGE plpgsql COST 0.000001 AS $$ BEGIN "
      "  IF rig NOT IN ('n1', 'n2') THEN RAISE EXCEPTION 'saw %', rig; END IF;"
      "  RETURN TRUE; END $$");
-  for (const char* plan : {"",
+  for (const char* plan : {"RESET enable_nestloop",
                            "SET enable_nestloop = off",
                            "SET enable_indexscan = off;"
                            "SET enable_bitmapscan = off"}) {

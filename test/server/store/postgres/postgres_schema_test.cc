@@ -195,7 +195,7 @@ TEST_F(PostgresSchemaTest, EveryDifferenceFromTheMigrationsIsFound) {
       {"CREATE OR REPLACE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql "
        "AS $$ BEGIN RETURN NULL; END $$",
        "function refuse"},
-      {"DROP TABLE disagreements", "table disagreements"},
+      {"DROP TABLE disagreements CASCADE", "table disagreements"},
       {"CREATE TABLE more (x BIGINT)", "table more"},
       {"ALTER VIEW fleet_rigs RESET (security_barrier)", "view fleet_rigs"},
   };
