@@ -219,9 +219,8 @@ class DatabaseStore final : public Store {
 
   absl::StatusOr<bool> WasActive(const std::string& rig,
                                  std::int64_t version) override {
-    return ReadOne([&](Connection* db) {
-      return server::WasActive(db, rig, version);
-    });
+    return ReadOne(
+        [&](Connection* db) { return server::WasActive(db, rig, version); });
   }
 
   absl::StatusOr<std::vector<StoredCalibration>> GetReports(

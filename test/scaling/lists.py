@@ -259,9 +259,7 @@ def _fleet_wide(of: Fleet, size: int) -> list[Request]:
         ),
         Request(
             "runs, failed, of a model",
-            page(
-                "recalibrations", filter="state = FAILED", rig_filter=model
-            ),
+            page("recalibrations", filter="state = FAILED", rig_filter=model),
         ),
         Request(
             "runs, started by age",
