@@ -7,6 +7,11 @@ ALTER TABLE segments
   ADD COLUMN angular_rate DOUBLE PRECISION,  -- of the body [rad/s]
   ADD COLUMN acceleration DOUBLE PRECISION;  -- in G [m/s^2]
 
+CREATE INDEX segments_by_angular_rate ON segments (rig, angular_rate, sequence)
+  WHERE angular_rate IS NOT NULL;
+CREATE INDEX segments_by_acceleration ON segments (rig, acceleration, sequence)
+  WHERE acceleration IS NOT NULL;
+
 CREATE INDEX all_segments_by_angular_rate
   ON segments (angular_rate, rig, sequence) WHERE angular_rate IS NOT NULL;
 CREATE INDEX all_segments_by_acceleration

@@ -6,6 +6,11 @@
 ALTER TABLE segments ADD COLUMN angular_rate REAL;  -- of the body [rad/s]
 ALTER TABLE segments ADD COLUMN acceleration REAL;  -- in G [m/s^2]
 
+CREATE INDEX segments_by_angular_rate ON segments (rig, angular_rate, sequence)
+  WHERE angular_rate IS NOT NULL;
+CREATE INDEX segments_by_acceleration ON segments (rig, acceleration, sequence)
+  WHERE acceleration IS NOT NULL;
+
 CREATE INDEX all_segments_by_angular_rate
   ON segments (angular_rate, rig, sequence) WHERE angular_rate IS NOT NULL;
 CREATE INDEX all_segments_by_acceleration

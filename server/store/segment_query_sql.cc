@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <limits>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -144,7 +144,8 @@ void AndSource(const SegmentQuery& query, Source source, SqlCondition* to) {
     case Source::kSegments:
       break;
     case Source::kScores:
-      return to->And("o.group_name = " + to->Parameter(query.order_group));
+      to->And("o.group_name = " + to->Parameter(query.order_group));
+      return to->And(fmt::format("{} IS NOT NULL", KeyColumn(query.order)));
     case Source::kExclusions:
       to->And("a.cause = " +
               to->Parameter(std::int64_t{static_cast<int>(*query.excluded)}));
@@ -272,17 +273,10 @@ absl::Status CheckOrderOfAll(const SegmentQuery& query) {
   }
 }
 
-absl::StatusOr<SegmentPlace> PlaceOfPage(const std::string& list,
-                                         const SegmentQuery& query,
-                                         const Page& page) {
+absl::StatusOr<std::optional<SegmentPlace>> PlaceOfPage(const std::string& list,
+                                                        const Page& page) {
   SELFCAL_ASSIGN_OR_RETURN(const auto text, PageKey(list, page));
-  if (!text) {
-    using Doubles = std::numeric_limits<double>;
-    if (query.descending) {
-      return SegmentPlace{Doubles::infinity(), INT64_MAX, INT64_MAX, INT64_MAX};
-    }
-    return SegmentPlace{-Doubles::infinity(), INT64_MIN, -1, -1};
-  }
+  if (!text) return std::nullopt;
   SegmentPlace place;
   const std::vector<std::string> numbers = absl::StrSplit(*text, ' ');
   if (numbers.size() == 4 && absl::SimpleAtod(numbers[0], &place.key) &&
@@ -309,7 +303,7 @@ std::string SelectSegments(const std::string& columns,
                            std::int64_t rig,
                            const SegmentQuery& query,
                            const RigQuery& rigs,
-                           const SegmentPlace& after,
+                           const std::optional<SegmentPlace>& after,
                            int limit,
                            SqlCondition* condition) {
   const bool of_all = rig == 0;
@@ -326,11 +320,14 @@ std::string SelectSegments(const std::string& columns,
   AndRanges(query, condition);
   AndScores(query, condition);
   const auto order = OrderColumns(query, source, of_all);
-  const auto values = OrderValues(query, of_all, after, condition);
-  condition->And(fmt::format("({}) {} ({})",
-                             fmt::join(order, ", "),
-                             query.descending ? "<" : ">",
-                             fmt::join(values, ", ")));
+  // A bound at the end of the index would hide that of a range of the query.
+  if (after) {
+    condition->And(fmt::format(
+        "({}) {} ({})",
+        fmt::join(order, ", "),
+        query.descending ? "<" : ">",
+        fmt::join(OrderValues(query, of_all, *after, condition), ", ")));
+  }
   SqlCondition of_rigs = condition->Next();
   if (of_all) AddRigConditions(rigs, "r", &of_rigs);
   const bool some_rigs = !of_rigs.is_empty();

@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "server/store/driver/sql_condition.h"
@@ -30,22 +31,21 @@ std::string ListName(const std::string& rig,
 // a page is read without the others. INVALID_ARGUMENT names these orders.
 absl::Status CheckOrderOfAll(const SegmentQuery& query);
 
-// The position in the token of a page, or the beginning of the list.
+// The position in the token of a page; nullopt: the beginning of the list.
 // INVALID_ARGUMENT for a token of another list.
-absl::StatusOr<SegmentPlace> PlaceOfPage(const std::string& list,
-                                         const SegmentQuery& query,
-                                         const Page& page);
+absl::StatusOr<std::optional<SegmentPlace>> PlaceOfPage(const std::string& list,
+                                                        const Page& page);
 std::string TokenAfter(const std::string& list, const SegmentPlace& place);
 
 // Selects segments `s` with their information `i`, at most `limit` after the
-// position: of the rig with this key or, if it is 0, of those of `rigs`. The
-// parameters of the text are those of *condition, which must be new. The key of
-// each row follows as the column after `columns`.
+// position, if there is one: of the rig with this key or, if it is 0, of those
+// of `rigs`. The parameters of the text are those of *condition, which must be
+// new. The key of each row follows as the column after `columns`.
 std::string SelectSegments(const std::string& columns,
                            std::int64_t rig,
                            const SegmentQuery& query,
                            const RigQuery& rigs,
-                           const SegmentPlace& after,
+                           const std::optional<SegmentPlace>& after,
                            int limit,
                            SqlCondition* condition);
 

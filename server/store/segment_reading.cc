@@ -120,8 +120,7 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
                                                       const RigQuery& of) {
   if (rig.empty()) SELFCAL_RETURN_IF_ERROR(CheckOrderOfAll(query));
   const std::string list = ListName(rig, query, of);
-  SELFCAL_ASSIGN_OR_RETURN(const SegmentPlace after,
-                           PlaceOfPage(list, query, page));
+  SELFCAL_ASSIGN_OR_RETURN(const auto after, PlaceOfPage(list, page));
   std::int64_t rig_id = 0;
   if (!rig.empty()) {
     SELFCAL_ASSIGN_OR_RETURN(rig_id, FindRigId(db, rig));

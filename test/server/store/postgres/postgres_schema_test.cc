@@ -162,7 +162,7 @@ TEST_F(PostgresSchemaTest, SegmentsOfAllRigsCanBeReadFromTheIndexOfTheirList) {
   for (const bool descending : {true, false}) {
     for (auto [query, expected] : lists) {
       query.descending = descending;
-      const auto after = PlaceOfPage("list", query, {});
+      const auto after = PlaceOfPage("list", {});
       ASSERT_TRUE(after.ok()) << after.status();
       SqlCondition condition;
       const std::string sql =

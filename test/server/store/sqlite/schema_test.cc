@@ -397,7 +397,7 @@ TEST_F(SchemaTest, SegmentsOfAllRigsAreReadFromTheIndexOfTheirList) {
   lists[2].second =
       "SEARCH s USING COVERING INDEX all_segments_by_acceleration";
   lists[3].first.state = SegmentState::kUnusable;
-  lists[3].second = "SEARCH s USING INDEX unusable_segments_by_time";
+  lists[3].second = "SCAN s USING INDEX unusable_segments_by_time";
   lists[4].first.state = SegmentState::kStored;
   lists[4].second = "SEARCH s USING INDEX unscored_segments";
   lists[5].first.excluded = ExclusionCause::kDoesNotFit;
@@ -405,7 +405,7 @@ TEST_F(SchemaTest, SegmentsOfAllRigsAreReadFromTheIndexOfTheirList) {
   for (const bool descending : {true, false}) {
     for (auto [query, expected] : lists) {
       query.descending = descending;
-      const auto after = PlaceOfPage("list", query, {});
+      const auto after = PlaceOfPage("list", {});
       ASSERT_TRUE(after.ok()) << after.status();
       SqlCondition condition;
       const std::string sql =
