@@ -36,6 +36,8 @@ WHERE s.rig = a.rig AND s.sequence = a.sequence AND a.cause > 3;
 CREATE INDEX rare_absences_by_time
   ON table_absences (cause, steady_ns, rig, sequence)
   WHERE steady_ns IS NOT NULL;
+CREATE INDEX rare_absences_of_rig ON table_absences (rig, cause, sequence)
+  WHERE steady_ns IS NOT NULL;
 
 -- Triggers set it, also for earlier programs that still run.
 CREATE FUNCTION note_arrival() RETURNS trigger

@@ -35,6 +35,8 @@ WHERE cause > 3;
 CREATE INDEX rare_absences_by_time
   ON table_absences (cause, steady_ns, rig, sequence)
   WHERE steady_ns IS NOT NULL;
+CREATE INDEX rare_absences_of_rig ON table_absences (rig, cause, sequence)
+  WHERE steady_ns IS NOT NULL;
 
 CREATE TRIGGER new_rare_absences_have_time
 AFTER INSERT ON table_absences WHEN NEW.cause > 3

@@ -90,21 +90,20 @@ std::string_view KeyColumn(SegmentQuery::Order order) {
   return "s.sequence";
 }
 
-// True if the exclusions for the cause have an index by time: it is rare.
+// True if the exclusions for the cause have indexes: it is rare.
 bool HasIndex(ExclusionCause cause) { return cause >= ExclusionCause::kTooOld; }
 
 // The table that is read in the order of a list, by an index.
 enum class Source { kSegments, kScores, kExclusions };
 
-Source SourceOf(const SegmentQuery& query, bool of_all) {
+Source SourceOf(const SegmentQuery& query) {
   switch (query.order) {
     case SegmentQuery::Order::kEntropy:
     case SegmentQuery::Order::kGain:
       return Source::kScores;
     case SegmentQuery::Order::kArrival:
-      return of_all && query.excluded && HasIndex(*query.excluded)
-                 ? Source::kExclusions
-                 : Source::kSegments;
+      return query.excluded && HasIndex(*query.excluded) ? Source::kExclusions
+                                                         : Source::kSegments;
     default:
       return Source::kSegments;
   }
@@ -189,7 +188,7 @@ std::vector<std::string> OrderValues(const SegmentQuery& query,
   if (by_arrival && of_all) {
     values.push_back(to->Parameter(after.steady_ns));
   } else if (!by_arrival) {
-    // The column may be one of whole numbers, which has no infinity.
+    // The column may be one of whole numbers.
     values.push_back(
         fmt::format("CAST({} AS DOUBLE PRECISION)", to->Parameter(after.key)));
   }
@@ -307,7 +306,7 @@ std::string SelectSegments(const std::string& columns,
                            int limit,
                            SqlCondition* condition) {
   const bool of_all = rig == 0;
-  const Source source = SourceOf(query, of_all);
+  const Source source = SourceOf(query);
   const char* const table = NameOf(source);
   AndSource(query, source, condition);
   if (!of_all) {

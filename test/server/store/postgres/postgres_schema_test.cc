@@ -177,6 +177,25 @@ TEST_F(PostgresSchemaTest, SegmentsOfAllRigsCanBeReadFromTheIndexOfTheirList) {
   }
 }
 
+TEST_F(PostgresSchemaTest, ExclusionsOfARigForARareCauseAreReadFromTheirIndex) {
+  ASSERT_TRUE(db_->Execute("SET enable_seqscan = off; SET enable_sort = off;"
+                           "SET enable_bitmapscan = off")
+                  .ok());
+  SegmentQuery query;
+  query.excluded = ExclusionCause::kDoesNotFit;
+  SqlCondition condition;
+  Statement plan(
+      db_.get(),
+      "EXPLAIN " +
+          SelectSegments(
+              "s.session", 7, query, {}, std::nullopt, 51, &condition));
+  condition.Bind(&plan);
+  std::string steps;
+  while (plan.Next()) steps += plan.Text(0) + "\n";
+  EXPECT_TRUE(plan.status().ok()) << plan.status();
+  EXPECT_THAT(steps, HasSubstr("rare_absences_of_rig"));
+}
+
 TEST_F(PostgresSchemaTest, ASoundSchemaHasNoProblems) {
   EXPECT_THAT(Problems(), IsEmpty());
 }

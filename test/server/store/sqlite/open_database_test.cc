@@ -142,7 +142,7 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
             "e277f3ecb3eb56c4b305b87fe2dbc0e56350bbb9a92936c1e389e68c8b50a479");
   EXPECT_EQ(migrations[23].name, "0024_segments_over_rigs.sql");
   EXPECT_EQ(migrations[23].sha256,
-            "dc9bfb0406d0edbdf4cca6dc26a37ed0c6ee51f1d9d935434a3d2cb1443ba546");
+            "11a8d656dbb51d9d0009ae05416dbe5c2ce639e4c531b8e933baa220026d81a8");
   EXPECT_EQ(migrations[24].name, "0025_versions_and_runs.sql");
   EXPECT_EQ(migrations[24].sha256,
             "93597e60786f2cd4f94491b3c22096ed76a7c9dddf83cd032ff8be7088e949bb");
