@@ -19,8 +19,12 @@ CREATE INDEX all_segments_by_acceleration
 CREATE INDEX all_segments_by_temperature
   ON segments (temperature_c, rig, sequence) WHERE temperature_c IS NOT NULL;
 
-CREATE INDEX stored_segments_by_time ON segments (steady_ns, rig, sequence)
-  WHERE state = 1;
+-- The queue of the scoring workers, now by rig. With the state as its first
+-- column, which the condition of the index implies, PostgreSQL could not search
+-- it for a rig and read all segments that wait.
+DROP INDEX unscored_segments;
+CREATE INDEX unscored_segments ON segments (rig, sequence) WHERE state = 1;
+
 CREATE INDEX unusable_segments_by_time ON segments (steady_ns, rig, sequence)
   WHERE state = 3;
 

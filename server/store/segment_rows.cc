@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <limits>
 
 #include "server/status/status_macros.h"
 #include "server/store/driver/statement.h"
@@ -262,27 +261,41 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
 
 absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
     Connection* db, int of_each_rig, const std::string& replica) {
+  // Each step is a search for one row, whatever statistics the engine has: a
+  // join could read all that wait.
+  const auto column = [](const std::string& expression) {
+    return "(SELECT " + expression +
+           " FROM segments s "
+           "  WHERE s.rig = o.rig AND s.sequence = o.sequence), ";
+  };
   Statement read(
       db,
       WithUnscoredRigs() +
-          "SELECT r.id, s.session, s.session_index, s.sequence, "
-          "  s.observations + s.imu_samples "
-          "FROM unscored_rigs u JOIN rigs r ON r.rig = u.rig "
-          "JOIN segments s ON s.rig = u.rig AND s.state = 1 "
-          "  AND s.sequence < coalesce((SELECT n.sequence FROM segments n "
-          "    WHERE n.state = 1 AND n.rig = u.rig "
-          "    ORDER BY n.sequence LIMIT 1 OFFSET ?1), ?3) "
-          "WHERE (?2 = '' OR EXISTS (SELECT 1 FROM claims c "
-          "  WHERE c.rig = u.rig AND c.replica = ?2)) "
-          "AND " +
-          IsOwnRig("u.rig") + " ORDER BY s.rig, s.sequence",
+          ", oldest (rig, sequence, place) AS ("
+          "  SELECT u.rig, (SELECT s.sequence FROM segments s "
+          "    WHERE s.state = 1 AND s.rig = u.rig "
+          "    ORDER BY s.sequence LIMIT 1), 1 "
+          "  FROM unscored_rigs u WHERE u.rig IS NOT NULL "
+          "    AND (?2 = '' OR EXISTS (SELECT 1 FROM claims c "
+          "      WHERE c.rig = u.rig AND c.replica = ?2)) AND " +
+          IsOwnRig("u.rig") +
+          "  UNION ALL "
+          "  SELECT o.rig, (SELECT s.sequence FROM segments s "
+          "    WHERE s.state = 1 AND s.rig = o.rig "
+          "      AND s.sequence > o.sequence "
+          "    ORDER BY s.sequence LIMIT 1), o.place + 1 "
+          "  FROM oldest o WHERE o.sequence IS NOT NULL AND o.place < ?1) "
+          "SELECT (SELECT r.id FROM rigs r WHERE r.rig = o.rig), " +
+          column("s.session") + column("s.session_index") +
+          column("s.observations + s.imu_samples") +
+          "o.sequence FROM oldest o WHERE o.sequence IS NOT NULL "
+          "ORDER BY o.rig, o.sequence",
       of_each_rig,
-      replica,
-      std::numeric_limits<std::int64_t>::max());
+      replica);
   std::vector<Store::Unscored> unscored;
   while (read.Next()) {
     unscored.push_back(
-        {read.Text(0), {read.Text(1), read.Int(2)}, read.Int(3), read.Int(4)});
+        {read.Text(0), {read.Text(1), read.Int(2)}, read.Int(4), read.Int(3)});
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return unscored;

@@ -11,10 +11,11 @@ namespace selfcal::server {
 // index unscored_segments.
 inline std::string WithUnscoredRigs() {
   return "WITH RECURSIVE unscored_rigs (rig) AS ("
-         "  SELECT (SELECT min(s.rig) FROM segments s WHERE s.state = 1) "
+         "  SELECT (SELECT s.rig FROM segments s WHERE s.state = 1 "
+         "    ORDER BY s.rig LIMIT 1) "
          "  UNION ALL "
-         "  SELECT (SELECT min(s.rig) FROM segments s "
-         "    WHERE s.state = 1 AND s.rig > u.rig) "
+         "  SELECT (SELECT s.rig FROM segments s "
+         "    WHERE s.state = 1 AND s.rig > u.rig ORDER BY s.rig LIMIT 1) "
          "  FROM unscored_rigs u WHERE u.rig IS NOT NULL) ";
 }
 

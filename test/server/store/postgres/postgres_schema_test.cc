@@ -145,7 +145,7 @@ TEST_F(PostgresSchemaTest, SegmentsOfAllRigsCanBeReadFromTheIndexOfTheirList) {
                            "SET enable_bitmapscan = off")
                   .ok());
   using Order = SegmentQuery::Order;
-  std::vector<std::pair<SegmentQuery, std::string>> lists(6);
+  std::vector<std::pair<SegmentQuery, std::string>> lists(5);
   lists[0].first.order = Order::kTemperature;
   lists[0].second = "all_segments_by_temperature";
   lists[1].first.order = Order::kAngularRate;
@@ -155,10 +155,8 @@ TEST_F(PostgresSchemaTest, SegmentsOfAllRigsCanBeReadFromTheIndexOfTheirList) {
   lists[2].second = "all_segments_by_acceleration";
   lists[3].first.state = SegmentState::kUnusable;
   lists[3].second = "unusable_segments_by_time";
-  lists[4].first.state = SegmentState::kStored;
-  lists[4].second = "stored_segments_by_time";
-  lists[5].first.excluded = ExclusionCause::kDoesNotFit;
-  lists[5].second = "rare_absences_by_time";
+  lists[4].first.excluded = ExclusionCause::kDoesNotFit;
+  lists[4].second = "rare_absences_by_time";
   for (const bool descending : {true, false}) {
     for (auto [query, expected] : lists) {
       query.descending = descending;
