@@ -114,7 +114,8 @@ Rig WithPrior(const Rig& rig, const CohortPrior& prior) {
   return after;
 }
 
-// How far the mean is moved, in sigmas of the new prior.
+// Distance by which the mean of each component moves, in sigmas of the new
+// prior.
 Eigen::VectorXd ChangeOfMean(const Rig& before, const Rig& after) {
   return BoxMinus(PriorMean(after), PriorMean(before))
       .cwiseAbs()

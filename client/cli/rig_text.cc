@@ -121,8 +121,8 @@ Facts Describe(const v1::Rig& rig,
   return facts;
 }
 
-// With the prior mean, if the rig has one. Returns an empty table if the
-// message is invalid.
+// The factory values, beside them the prior mean if the rig has one. Empty if
+// the message is invalid.
 Table FactoryValues(const v1::Rig& rig) {
   std::vector<Column> columns = {{"factory"}, {"value", true}, {"unit"}};
   if (rig.has_prior_mean()) columns.push_back({"prior mean", true});

@@ -1,4 +1,4 @@
-// How much a device moves in a segment: figures to find and compare segments
+// Statistics of the motion in a segment: figures to find and compare segments
 // by. No estimate uses them.
 #pragma once
 

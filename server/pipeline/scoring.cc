@@ -46,7 +46,7 @@ ScoringWorkers::ScoringWorkers(
       on_change_(std::move(on_change)),
       on_done_(std::move(on_done)),
       places_(options.max_backlog),
-      // Of one rig, each of the other threads scores at most one.
+      // Each of the other threads scores at most one segment of a rig.
       queue_(claims, [this] {
         return store()->ListUnscored(ThreadCount(), claims_->replica());
       }) {}

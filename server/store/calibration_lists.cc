@@ -79,7 +79,7 @@ absl::StatusOr<Listed<VersionKey>> FindVersions(Connection* db,
                                                 const RigQuery& of) {
   const std::string list = CalibrationListName(rig, query, of);
   const RowOrder order = CalibrationOrder(rig, query);
-  SELFCAL_ASSIGN_OR_RETURN(RowPlace place, RowPlaceOf(list, order, page));
+  SELFCAL_ASSIGN_OR_RETURN(const RowPlace place, RowPlaceOf(list, order, page));
   SqlCondition condition;
   if (!rig.empty()) {
     SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
@@ -104,15 +104,11 @@ absl::StatusOr<Listed<VersionKey>> FindVersions(Connection* db,
                              limit));
   condition.Bind(&read);
   Listed<VersionKey> found;
-  while (read.Next()) {
-    if (static_cast<int>(found.items.size()) == size) {
-      found.next_token = TokenAfter(list, place);
-      break;
-    }
-    place = PlaceOfRow(order, read, 2);
-    found.items.emplace_back(read.Int(0), read.Int(1));
-  }
-  SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_ASSIGN_OR_RETURN(
+      found.next_token,
+      ReadPage(list, order, 2, size, &read, [&](const Statement& row) {
+        found.items.emplace_back(row.Int(0), row.Int(1));
+      }));
   return found;
 }
 

@@ -36,6 +36,26 @@ RowPlace PlaceOfRow(const RowOrder& order,
                     const Statement& row,
                     int first_column);
 
+// Reads a page of `size` rows of a statement that selects one more, whose
+// columns of the order begin at `first_column`: calls `add` with each row.
+// Returns the token of the next page; empty if this is the last.
+template <typename Add>
+absl::StatusOr<std::string> ReadPage(std::string_view list,
+                                     const RowOrder& order,
+                                     int first_column,
+                                     int size,
+                                     Statement* read,
+                                     const Add& add) {
+  RowPlace place;
+  for (int count = 0; read->Next(); ++count) {
+    if (count == size) return TokenAfter(list, place);
+    place = PlaceOfRow(order, *read, first_column);
+    add(*read);
+  }
+  if (!read->status().ok()) return read->status();
+  return std::string();
+}
+
 // The condition that a row follows the place, if there is one.
 void AndAfter(const RowOrder& order, const RowPlace& place, SqlCondition* to);
 // The columns with their direction, for ORDER BY.

@@ -219,7 +219,7 @@ absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
                                               const RigQuery& of) {
   const std::string list = RunListName(rig, query, of);
   const RowOrder order = RunOrder(rig, query);
-  SELFCAL_ASSIGN_OR_RETURN(RowPlace place, RowPlaceOf(list, order, page));
+  SELFCAL_ASSIGN_OR_RETURN(const RowPlace place, RowPlaceOf(list, order, page));
   SqlCondition condition;
   if (!rig.empty()) {
     SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
@@ -242,15 +242,12 @@ absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
   condition.Bind(&read);
   Listed<StoredRun> listed;
   RunRows rows;
-  while (read.Next()) {
-    if (static_cast<int>(rows.runs.size()) == size) {
-      listed.next_token = TokenAfter(list, place);
-      break;
-    }
-    place = PlaceOfRow(order, read, kRunColumnCount);
-    rows.Add(read);
-  }
-  SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_ASSIGN_OR_RETURN(
+      listed.next_token,
+      ReadPage(
+          list, order, kRunColumnCount, size, &read, [&](const Statement& row) {
+            rows.Add(row);
+          }));
   SELFCAL_ASSIGN_OR_RETURN(listed.items, Complete(db, std::move(rows)));
   return listed;
 }

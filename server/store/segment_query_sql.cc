@@ -197,7 +197,7 @@ std::vector<std::string> OrderValues(const SegmentQuery& query,
   return values;
 }
 
-// With its length, so that no text can look like that of another part.
+// The text has its length, so that none can look like that of another part.
 std::string PartText(const std::optional<std::string>& value) {
   return value ? fmt::format("={}:{}", value->size(), *value) : "";
 }

@@ -99,7 +99,8 @@ struct StoredSegment {
   int landmarks = 0;
   int observations = 0;
   std::optional<double> temperature_c;  // of the device
-  // Of segments that were received since it is computed.
+  // nullopt: an earlier program, which did not compute it, received the
+  // segment.
   std::optional<MotionStatistics> motion;
   std::optional<SegmentInformation> information;  // if scored
   std::vector<std::string> tables;                // groups that hold it
@@ -411,8 +412,8 @@ class Store {
       const std::string& rig, std::int64_t version) = 0;
   virtual absl::StatusOr<StoredCalibration> GetActiveCalibration(
       const std::string& rig) = 0;
-  // Whether the version has ever been the active one. Reads nothing of its
-  // content.
+  // True if the version has ever been the active one. Reads nothing of its
+  // content. NOT_FOUND.
   virtual absl::StatusOr<bool> WasActive(const std::string& rig,
                                          std::int64_t version) = 0;
   // Rig, version, report and seconds of those that exist and are not damaged,

@@ -31,8 +31,8 @@ class NewDevice : public testing::Test {
 
   double Normal() { return std::normal_distribution()(random_); }
 
-  // Of a segment that was scored at the factory calibration and observes
-  // `rows` directions of the free components.
+  // Information of a segment that was scored at the factory calibration and
+  // observes `rows` directions of the free components.
   SegmentInformation Segment(int rows) {
     Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, sigmas_.size());
     Eigen::VectorXd noise(rows);

@@ -38,7 +38,7 @@ export function filterOf(address: URLSearchParams, menus: Menu[]): string {
   return [(address.get('filter') ?? '').trim(), ...chosen].filter(Boolean).join(' AND ');
 }
 
-// Whether the address chooses some of the items, or another order.
+// True if the address chooses some of the items, or another order.
 export function isNarrowed(address: URLSearchParams, menus: Menu[]): boolean {
   return filterOf(address, menus) !== '' || address.has('order_by');
 }

@@ -93,7 +93,7 @@ function Nothing(props: { filter: string; withAlarms: boolean }) {
   );
 }
 
-// What an administrator may change: by an action, or by one that a form makes.
+// The changes that an administrator may make: actions, or forms that make one.
 const kOffers: (BulkAction | BulkForm)[] = [kRecalibrate, kRollBack, kLabel, kConfigure];
 
 interface Asked {
