@@ -1,6 +1,5 @@
 #include "server/domain/admission.h"
 
-#include <utility>
 #include <vector>
 
 #include "core/selection/fit.h"
@@ -10,27 +9,13 @@
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
-namespace {
-
-// The segments in the tables, each once.
-absl::StatusOr<std::vector<SegmentRow>> KeptSegments(UnitOfWork* tx) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
-  std::vector<SegmentRow> kept;
-  for (const TableEntry& entry : UnionOfTables(tables)) {
-    SELFCAL_ASSIGN_OR_RETURN(SegmentRow segment, FindSegment(tx, entry.key));
-    kept.push_back(std::move(segment));
-  }
-  return kept;
-}
-
-}  // namespace
 
 absl::StatusOr<std::optional<double>> LargestFitOfRig(UnitOfWork* tx) {
   const FitPolicy policy;
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<double> newest,
                            NewestFits(tx, policy.newest));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentRow> kept,
-                           KeptSegments(tx));
+                           SegmentsInTables(tx));
   std::vector<double> fits;
   for (const SegmentRow& segment : kept) fits.push_back(segment.fit);
   return LargestFit(newest, fits, policy);
@@ -39,7 +24,7 @@ absl::StatusOr<std::optional<double>> LargestFitOfRig(UnitOfWork* tx) {
 absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit) {
   if (!largest_fit) return absl::OkStatus();
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentRow> kept,
-                           KeptSegments(tx));
+                           SegmentsInTables(tx));
   for (const SegmentRow& segment : kept) {
     if (segment.fit <= *largest_fit) continue;
     SELFCAL_RETURN_IF_ERROR(LeaveTables(tx,

@@ -29,11 +29,9 @@ absl::Status LeaveTablesIf(
   for (const Table& table : tables) {
     for (const TableEntry& entry : table.entries) {
       if (!leaves(entry)) continue;
-      SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
-                               FindSegment(tx, entry.key));
       SELFCAL_RETURN_IF_ERROR(
-          WriteExclusion(tx, segment.sequence, table.group, {.cause = cause}));
-      SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, segment.sequence));
+          WriteExclusion(tx, entry.sequence, table.group, {.cause = cause}));
+      SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, entry.sequence));
     }
   }
   return absl::OkStatus();

@@ -123,12 +123,11 @@ absl::Status WriteOffer(UnitOfWork* tx,
                         const Table& table) {
   SELFCAL_RETURN_IF_ERROR(WriteScored(tx, table.group, table.scored));
   if (change.evicted) {
-    SELFCAL_ASSIGN_OR_RETURN(const SegmentRow evicted,
-                             FindSegment(tx, change.evicted->key));
-    SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, evicted.sequence));
+    const std::int64_t evicted = change.evicted->sequence;
+    SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, evicted));
     SELFCAL_RETURN_IF_ERROR(
         WriteExclusion(tx,
-                       evicted.sequence,
+                       evicted,
                        table.group,
                        {.cause = ExclusionCause::kReplaced,
                         .rival = segment.sequence,
@@ -158,12 +157,11 @@ absl::Status ExplainRefusal(UnitOfWork* tx,
                           {.cause = ExclusionCause::kInsufficientGain});
   }
   const TableEntry& worst = rival_entry.value_or(table.entries.back());
-  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow rival, FindSegment(tx, worst.key));
   return WriteExclusion(tx,
                         segment.sequence,
                         table.group,
                         {.cause = ExclusionCause::kOutranked,
-                         .rival = rival.sequence,
+                         .rival = worst.sequence,
                          .rival_entropy = worst.entropy});
 }
 

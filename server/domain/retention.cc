@@ -40,10 +40,9 @@ absl::StatusOr<std::vector<Table>> RemoveAgedEntries(UnitOfWork* tx,
                                                      std::int64_t now_ns) {
   const std::int64_t max_age_ns = rig.policy.table_max_age_ns;
   if (max_age_ns > 0 && !tx->now().keeps_aged) {
-    SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
-    for (const TableEntry& entry : UnionOfTables(tables)) {
-      SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
-                               FindSegment(tx, entry.key));
+    SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentRow> kept,
+                             SegmentsInTables(tx));
+    for (const SegmentRow& segment : kept) {
       if (segment.receive_steady_ns >= now_ns - max_age_ns) continue;
       SELFCAL_RETURN_IF_ERROR(LeaveTables(
           tx, segment.sequence, {.cause = ExclusionCause::kTooOld}));

@@ -81,7 +81,9 @@ bool RigClaims::IsFirst() const {
   return is_first_;
 }
 
-void RigClaims::Wake() { thread_.Wake(); }
+void RigClaims::Wake(const std::string& rig) {
+  if (arriving_.Note(rig)) thread_.Wake();
+}
 
 bool RigClaims::Responds() const {
   if (!options_.shared) return true;
@@ -106,6 +108,7 @@ absl::StatusOr<std::chrono::milliseconds> RigClaims::Pass() {
   if (is_due) {
     SELFCAL_RETURN_IF_ERROR(Beat());
     next_beat_ = Clock::now() + options_.beat;
+    arriving_.ForgetForeign();
     SELFCAL_RETURN_IF_ERROR(RemoveSilent());
     SELFCAL_RETURN_IF_ERROR(Review());
   }
@@ -186,13 +189,19 @@ absl::Status RigClaims::Claim(const std::string& rig) {
 }
 
 absl::StatusOr<bool> RigClaims::ClaimMore() {
+  std::set<std::string> arrived = arriving_.Take();
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> unclaimed,
                            store_->replicas()->ListUnclaimed(kRigsAtATime + 1));
   for (std::size_t i = 0; i < unclaimed.size() && i < kRigsAtATime; ++i) {
     SELFCAL_RETURN_IF_ERROR(Claim(unclaimed[i]));
     if (held_.Find(unclaimed[i])) ++busy_;
   }
-  return unclaimed.size() > kRigsAtATime;
+  const bool more = unclaimed.size() > kRigsAtATime;
+  if (!more) {
+    std::erase_if(arrived, [&](const auto& rig) { return held_.Find(rig); });
+    arriving_.NoteForeign(arrived);
+  }
+  return more;
 }
 
 }  // namespace selfcal::server

@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 
+#include "server/pipeline/arriving_rigs.h"
 #include "server/pipeline/backoff.h"
 #include "server/pipeline/held_claims.h"
 #include "server/pipeline/other_replicas.h"
@@ -46,8 +47,8 @@ class RigClaims {
   // True for one daemon of the database, but for the moments in which it
   // changes: for what one of them has to look after.
   bool IsFirst() const;
-  // A rig may have work and no daemon.
-  void Wake();
+  // The rig, which this daemon has not claimed, has work and perhaps no daemon.
+  void Wake(const std::string& rig);
   // False while the database that is shared has not responded for several
   // beats.
   bool Responds() const;
@@ -74,6 +75,7 @@ class RigClaims {
   const ReplicaOptions options_;
   const std::function<void()> on_beat_;
   HeldClaims held_;
+  ArrivingRigs arriving_;
   // The next three are used by the thread alone.
   OtherReplicas others_;
   Clock::time_point next_beat_;

@@ -94,8 +94,11 @@ absl::Status ScoringWorkers::TakePlace(const std::string& rig,
 
 void ScoringWorkers::FillPlace(const std::string& rig) {
   places_.Fill(rig);
-  queue_.Wake();
-  if (!claims_->Find(rig)) claims_->Wake();
+  if (claims_->Find(rig)) {
+    queue_.Wake();
+  } else {
+    claims_->Wake(rig);  // wakes the queue once it has the claim
+  }
 }
 
 void ScoringWorkers::ReturnPlace(const std::string& rig) {

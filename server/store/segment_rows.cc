@@ -111,6 +111,18 @@ absl::StatusOr<std::vector<SegmentRow>> SegmentsOfSession(
   return ReadRows(&read);
 }
 
+absl::StatusOr<std::vector<SegmentRow>> SegmentsInTables(UnitOfWork* tx) {
+  Statement read(tx->db(),
+                 fmt::format("SELECT {} FROM (SELECT DISTINCT sequence "
+                             "  FROM table_entries WHERE rig = ?1) e "
+                             "CROSS JOIN segments s "
+                             "WHERE s.rig = ?1 AND s.sequence = e.sequence "
+                             "ORDER BY s.sequence",
+                             kColumns),
+                 tx->rig_row());
+  return ReadRows(&read);
+}
+
 absl::StatusOr<std::int64_t> CountUnscored(UnitOfWork* tx) {
   return ReadInt(tx->db(),
                  "SELECT count(*) FROM segments WHERE rig = ?1 AND state = 1",

@@ -92,6 +92,8 @@ absl::StatusOr<std::vector<SegmentRow>> SegmentsOfSession(
     UnitOfWork* tx,
     const std::string& session,
     std::optional<std::int64_t> index);
+// The segments in the tables, each once, in order of arrival.
+absl::StatusOr<std::vector<SegmentRow>> SegmentsInTables(UnitOfWork* tx);
 // True if a segment of the rig waits for its score.
 absl::StatusOr<bool> HasUnscored(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> CountUnscored(UnitOfWork* tx);
