@@ -3,6 +3,7 @@
 #include <cmath>
 #include <compare>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -287,6 +288,11 @@ void CheckImu(std::string_view name,
 // Returns for each key the index of the first equal key before it, or -1.
 template <class Key>
 std::vector<std::int64_t> EarlierEquals(const std::vector<Key>& keys) {
+  std::vector<std::int64_t> earlier(keys.size(), -1);
+  const bool ascend =
+      std::adjacent_find(keys.begin(), keys.end(), std::greater_equal<>()) ==
+      keys.end();
+  if (ascend) return earlier;  // as in most segments
   std::vector<std::int64_t> order(keys.size());
   for (std::size_t i = 0; i < keys.size(); ++i) {
     order[i] = static_cast<std::int64_t>(i);
@@ -294,7 +300,6 @@ std::vector<std::int64_t> EarlierEquals(const std::vector<Key>& keys) {
   std::sort(order.begin(), order.end(), [&](std::int64_t a, std::int64_t b) {
     return keys[a] < keys[b] || (keys[a] == keys[b] && a < b);
   });
-  std::vector<std::int64_t> earlier(keys.size(), -1);
   for (std::size_t i = 1; i < order.size(); ++i) {
     if (keys[order[i]] != keys[order[i - 1]]) continue;
     const std::int64_t before = earlier[order[i - 1]];
