@@ -296,15 +296,12 @@ std::string TokenAfter(const std::string& list, const SegmentPlace& place) {
                                    place.sequence));
 }
 
-// The inner query finds the rows of the page, the outer one reads their
-// content.
-std::string SelectSegments(const std::string& columns,
-                           std::int64_t rig,
-                           const SegmentQuery& query,
-                           const RigQuery& rigs,
-                           const std::optional<SegmentPlace>& after,
-                           int limit,
-                           SqlCondition* condition) {
+std::string SelectPlaces(std::int64_t rig,
+                         const SegmentQuery& query,
+                         const RigQuery& rigs,
+                         const std::optional<SegmentPlace>& after,
+                         int limit,
+                         SqlCondition* condition) {
   const bool of_all = rig == 0;
   const Source source = SourceOf(query);
   const char* const table = NameOf(source);
@@ -332,29 +329,31 @@ std::string SelectSegments(const std::string& columns,
   const bool some_rigs = !of_rigs.is_empty();
   if (some_rigs) condition->And(of_rigs);
   const std::string_view way = query.descending ? "DESC" : "ASC";
-  const std::string sorted =
-      fmt::format("{} {}", fmt::join(order, fmt::format(" {}, ", way)), way);
-  // A segment is excluded from several tables.
-  const char* const distinct = source == Source::kExclusions ? "DISTINCT " : "";
-  return fmt::format(
-      "SELECT {}, page.key FROM (SELECT {}{}.rig, {}.sequence, {} AS key "
-      "FROM {} {} WHERE {} ORDER BY {} LIMIT {}) page "
-      "JOIN segments s USING (rig, sequence) "
-      "LEFT JOIN segment_information i USING (rig, sequence) "
-      "ORDER BY page.key {}, s.rig {}, s.sequence {}",
-      columns,
-      distinct,
-      table,
-      table,
-      order.front(),
-      TablesOf(source),
-      some_rigs ? "JOIN rigs r ON r.rig = s.rig" : "",
-      condition->sql(),
-      sorted,
-      limit,
-      way,
-      way,
-      way);
+  return fmt::format("SELECT {}{} FROM {} {} WHERE {} ORDER BY {} {} LIMIT {}",
+                     // A segment is excluded from several tables.
+                     source == Source::kExclusions ? "DISTINCT " : "",
+                     fmt::join(order, ", "),
+                     TablesOf(source),
+                     some_rigs ? "JOIN rigs r ON r.rig = s.rig" : "",
+                     condition->sql(),
+                     fmt::join(order, fmt::format(" {}, ", way)),
+                     way,
+                     limit);
+}
+
+SegmentPlace PlaceOfRow(std::int64_t rig,
+                        const SegmentQuery& query,
+                        const Statement& row) {
+  SegmentPlace place;
+  int column = 0;
+  if (query.order != SegmentQuery::Order::kArrival) {
+    place.key = row.Double(column++);
+  } else if (rig == 0) {
+    place.steady_ns = row.Int(column++);
+  }
+  place.rig = rig == 0 ? row.Int(column++) : rig;
+  place.sequence = row.Int(column);
+  return place;
 }
 
 }  // namespace selfcal::server

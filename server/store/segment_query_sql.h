@@ -8,6 +8,7 @@
 #include <string>
 
 #include "server/store/driver/sql_condition.h"
+#include "server/store/driver/statement.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -37,16 +38,19 @@ absl::StatusOr<std::optional<SegmentPlace>> PlaceOfPage(const std::string& list,
                                                         const Page& page);
 std::string TokenAfter(const std::string& list, const SegmentPlace& place);
 
-// Selects segments `s` with their information `i`, at most `limit` after the
-// position, if there is one: of the rig with this key or, if it is 0, of those
-// of `rigs`. The parameters of the text are those of *condition, which must be
-// new. The key of each row follows as the column after `columns`.
-std::string SelectSegments(const std::string& columns,
-                           std::int64_t rig,
-                           const SegmentQuery& query,
-                           const RigQuery& rigs,
-                           const std::optional<SegmentPlace>& after,
-                           int limit,
-                           SqlCondition* condition);
+// Selects the places of segments, at most `limit` after the position, if there
+// is one: of the rig with this key or, if it is 0, of those of `rigs`. The
+// parameters of the text are those of *condition, which must be new. A place
+// has only what the index of the order has, so that it is read alone.
+std::string SelectPlaces(std::int64_t rig,
+                         const SegmentQuery& query,
+                         const RigQuery& rigs,
+                         const std::optional<SegmentPlace>& after,
+                         int limit,
+                         SqlCondition* condition);
+// A row of that statement.
+SegmentPlace PlaceOfRow(std::int64_t rig,
+                        const SegmentQuery& query,
+                        const Statement& row);
 
 }  // namespace selfcal::server

@@ -1,9 +1,15 @@
 // Reads StoredSegments, one or a page of them, and writes the information that
 // is read here.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <map>
+#include <utility>
+#include <vector>
 
 #include "server/status/status_macros.h"
 #include "server/store/checksum.h"
@@ -19,40 +25,36 @@ namespace selfcal::server {
 namespace {
 
 constexpr char kSegmentColumns[] =
-    "s.session, s.session_index, s.sequence, s.state, s.problem, "
-    "  s.receive_time_ns, s.calibration_version, s.start_ns, s.end_ns, "
-    "  s.keyframes, s.imu_samples, s.landmarks, s.observations, "
-    "  i.information, i.sha256, "
+    "s.rig, s.sequence, (SELECT g.id FROM rigs g WHERE g.rig = s.rig), "
+    "  s.session, s.session_index, s.state, s.problem, s.receive_time_ns, "
+    "  s.calibration_version, s.start_ns, s.end_ns, s.keyframes, "
+    "  s.imu_samples, s.landmarks, s.observations, "
     "  (SELECT length(p.data) FROM payloads p "
     "    WHERE p.rig = s.rig AND p.sequence = s.sequence), "
-    "  s.temperature_c, s.steady_ns, s.rig, "
-    "  (SELECT g.id FROM rigs g WHERE g.rig = s.rig), "
-    "  s.angular_rate, s.acceleration";
-constexpr int kSteadyColumn = 17;
-constexpr int kRigColumn = 18;
-constexpr int kKeyColumn = 22;  // after the columns of a list
+    "  s.temperature_c, s.angular_rate, s.acceleration";
+constexpr int kInformationColumn = 19;  // after these, and its checksum
 
 StoredSegment MetadataFromRow(const Statement& row) {
   StoredSegment segment;
-  segment.rig = row.Text(19);
-  segment.key = {row.Text(0), row.Int(1)};
-  segment.sequence = row.Int(2);
-  segment.state = static_cast<SegmentState>(row.Int(3));
-  segment.problem = row.Text(4);
-  segment.receive_time_ns = row.Int(5);
-  segment.calibration_version = row.Int(6);
-  segment.start_ns = row.Int(7);
-  segment.end_ns = row.Int(8);
-  segment.keyframes = static_cast<int>(row.Int(9));
-  segment.imu_samples = static_cast<int>(row.Int(10));
-  segment.landmarks = static_cast<int>(row.Int(11));
-  segment.observations = static_cast<int>(row.Int(12));
+  segment.sequence = row.Int(1);
+  segment.rig = row.Text(2);
+  segment.key = {row.Text(3), row.Int(4)};
+  segment.state = static_cast<SegmentState>(row.Int(5));
+  segment.problem = row.Text(6);
+  segment.receive_time_ns = row.Int(7);
+  segment.calibration_version = row.Int(8);
+  segment.start_ns = row.Int(9);
+  segment.end_ns = row.Int(10);
+  segment.keyframes = static_cast<int>(row.Int(11));
+  segment.imu_samples = static_cast<int>(row.Int(12));
+  segment.landmarks = static_cast<int>(row.Int(13));
+  segment.observations = static_cast<int>(row.Int(14));
   segment.has_data = !row.IsNull(15);
   segment.payload_bytes = row.Int(15);
   if (!row.IsNull(16)) segment.temperature_c = row.Double(16);
-  if (!row.IsNull(20) && !row.IsNull(21)) {
-    segment.motion = {.angular_rate_radps = row.Double(20),
-                      .acceleration_mps2 = row.Double(21)};
+  if (!row.IsNull(17) && !row.IsNull(18)) {
+    segment.motion = {.angular_rate_radps = row.Double(17),
+                      .acceleration_mps2 = row.Double(18)};
   }
   return segment;
 }
@@ -67,22 +69,96 @@ absl::StatusOr<SegmentInformation> InformationFromRow(
   return ParseInformationOf(rig, key, bytes);
 }
 
-// Fills what it can; the status is that of the information.
-absl::Status FillFromRow(Connection* db,
-                         const Statement& row,
-                         StoredSegment* segment) {
-  *segment = MetadataFromRow(row);
-  SELFCAL_ASSIGN_OR_RETURN(
-      segment->tables,
-      TablesOfSegment(db, row.Int(kRigColumn), segment->sequence));
-  if (row.IsNull(13)) {
-    return absl::OkStatus();
+// The rows of a page in the table with this name. Those of one rig are a list
+// of numbers, for which PostgreSQL can fetch all blocks at once.
+SqlCondition AreOnPage(const std::string& table,
+                       const std::vector<SegmentPlace>& page) {
+  SqlCondition condition;
+  const std::int64_t rig = page.front().rig;
+  const bool of_one_rig = std::all_of(
+      page.begin(), page.end(), [&](const auto& at) { return at.rig == rig; });
+  std::vector<std::int64_t> sequences;
+  std::vector<std::vector<SqlCondition::Value>> rows;
+  for (const SegmentPlace& at : page) {
+    sequences.push_back(at.sequence);
+    rows.push_back({at.rig, at.sequence});
   }
-  SELFCAL_ASSIGN_OR_RETURN(
-      segment->information,
-      InformationFromRow(
-          segment->rig, segment->key, row.Text(13), row.Text(14)));
-  return absl::OkStatus();
+  if (of_one_rig) {
+    condition.And(fmt::format("{0}.rig = {1} AND {0}.sequence IN ({2})",
+                              table,
+                              condition.Parameter(rig),
+                              fmt::join(sequences, ", ")));
+  } else {
+    condition.AndIn(fmt::format("({0}.rig, {0}.sequence)", table), rows);
+  }
+  return condition;
+}
+
+// The segments of a page, by the keys of their rig and their sequence.
+using PageRows = std::map<std::pair<std::int64_t, std::int64_t>, StoredSegment>;
+
+// Calls `add` with the segment of each row that `select` finds for the page;
+// the first two columns are its keys.
+absl::Status AddToPage(
+    Connection* db,
+    const std::string& select,
+    const std::string& table,
+    const std::vector<SegmentPlace>& page,
+    PageRows* rows,
+    const std::function<absl::Status(const Statement&, StoredSegment*)>& add) {
+  const SqlCondition condition = AreOnPage(table, page);
+  Statement read(db, Reuse::kOnce, select + " WHERE " + condition.sql());
+  condition.Bind(&read);
+  while (read.Next()) {
+    SELFCAL_RETURN_IF_ERROR(add(read, &(*rows)[{read.Int(0), read.Int(1)}]));
+  }
+  return read.status();
+}
+
+absl::StatusOr<PageRows> ReadPageRows(Connection* db,
+                                      const std::vector<SegmentPlace>& page) {
+  PageRows rows;
+  if (page.empty()) return rows;
+  SELFCAL_RETURN_IF_ERROR(
+      AddToPage(db,
+                fmt::format("SELECT {} FROM segments s", kSegmentColumns),
+                "s",
+                page,
+                &rows,
+                [](const Statement& row, StoredSegment* segment) {
+                  *segment = MetadataFromRow(row);
+                  return absl::OkStatus();
+                }));
+  SELFCAL_RETURN_IF_ERROR(
+      AddToPage(db,
+                "SELECT i.rig, i.sequence, i.information, i.sha256 "
+                "FROM segment_information i",
+                "i",
+                page,
+                &rows,
+                [](const Statement& row, StoredSegment* segment) {
+                  auto information = InformationFromRow(
+                      segment->rig, segment->key, row.Text(2), row.Text(3));
+                  const absl::Status& status = information.status();
+                  if (absl::IsDataLoss(status)) {
+                    segment->problem = std::string(status.message());
+                    return absl::OkStatus();
+                  }
+                  SELFCAL_RETURN_IF_ERROR(status);
+                  segment->information = *std::move(information);
+                  return absl::OkStatus();
+                }));
+  SELFCAL_RETURN_IF_ERROR(
+      AddToPage(db,
+                "SELECT e.rig, e.sequence, e.group_name FROM table_entries e",
+                "e",
+                page,
+                &rows,
+                [](const Statement& row, StoredSegment* segment) {
+                  segment->tables.push_back(row.Text(2));
+                  return absl::OkStatus();
+                }));
+  return rows;
 }
 
 }  // namespace
@@ -92,7 +168,8 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
                                           const SegmentKey& key) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   Statement read(db,
-                 fmt::format("SELECT {} FROM segments s LEFT JOIN "
+                 fmt::format("SELECT {}, i.information, i.sha256 "
+                             "FROM segments s LEFT JOIN "
                              "segment_information i USING (rig, sequence) "
                              "WHERE s.rig = ?1 AND s.session = ?2 "
                              "AND s.session_index = ?3",
@@ -105,8 +182,17 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
   if (!found) {
     return absl::NotFoundError(SegmentText(rig, key) + " was never received");
   }
-  StoredSegment segment;
-  SELFCAL_RETURN_IF_ERROR(FillFromRow(db, read, &segment));
+  StoredSegment segment = MetadataFromRow(read);
+  SELFCAL_ASSIGN_OR_RETURN(segment.tables,
+                           TablesOfSegment(db, rig_id, segment.sequence));
+  if (!read.IsNull(kInformationColumn)) {
+    SELFCAL_ASSIGN_OR_RETURN(
+        segment.information,
+        InformationFromRow(segment.rig,
+                           segment.key,
+                           read.Text(kInformationColumn),
+                           read.Text(kInformationColumn + 1)));
+  }
   if (segment.key != key) {
     return OfAnotherSegment(SegmentText(rig, key), segment.rig, segment.key);
   }
@@ -127,36 +213,24 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
   }
   const auto size = static_cast<std::size_t>(PageSize(page));
   SqlCondition condition;
-  const std::string sql = SelectSegments(kSegmentColumns,
-                                         rig_id,
-                                         query,
-                                         of,
-                                         after,
-                                         static_cast<int>(size) + 1,
-                                         &condition);
+  const std::string sql = SelectPlaces(
+      rig_id, query, of, after, static_cast<int>(size) + 1, &condition);
   Statement read(db, Reuse::kOnce, sql);
   condition.Bind(&read);
+  std::vector<SegmentPlace> places;
   Listed<StoredSegment> listed;
-  SegmentPlace last;
   while (read.Next()) {
-    if (listed.items.size() == size) {
-      listed.next_token = TokenAfter(list, last);
+    if (places.size() == size) {
+      listed.next_token = TokenAfter(list, places.back());
       break;
     }
-    StoredSegment segment;
-    const absl::Status status = FillFromRow(db, read, &segment);
-    if (absl::IsDataLoss(status)) {
-      segment.problem = std::string(status.message());
-    } else if (!status.ok()) {
-      return status;
-    }
-    last = {read.Double(kKeyColumn),
-            read.Int(kSteadyColumn),
-            read.Int(kRigColumn),
-            segment.sequence};
-    listed.items.push_back(std::move(segment));
+    places.push_back(PlaceOfRow(rig_id, query, read));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_ASSIGN_OR_RETURN(PageRows rows, ReadPageRows(db, places));
+  for (const SegmentPlace& place : places) {
+    listed.items.push_back(std::move(rows.at({place.rig, place.sequence})));
+  }
   return listed;
 }
 
