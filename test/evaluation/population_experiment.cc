@@ -42,8 +42,8 @@ constexpr double kContradiction = 0.01;
 // As far as a factory's calibration is off (CalibrationError).
 Rig CohortRig() {
   Rig rig = HandheldRig("device");
-  rig.prior_sigmas = {{"imu.*.scale.*", 0.01},
-                      {"imu.*.misalignment.*", 0.01},
+  rig.prior_sigmas = {{"*.scale.*", 0.01},
+                      {"*.misalignment.*", 0.01},
                       {"imu.q_AI.*", 0.0175},
                       {"*.q_CI.*", 0.0175},
                       {"*.p_CI.*", 0.01},
