@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { ask } from './bulk_tests.mjs';
 
 // Shows the pages as at a hub to which devices report the rigs whose names begin
-// so, and takes the instructions for `rig`.
+// so, and takes and lists the instructions for `rig`.
 async function asHub(r, prefix, rig) {
   const isActivity = (url) => url.pathname === '/api/v1/activity';
   await r.page.route(isActivity, async (route) => {
@@ -19,8 +19,16 @@ async function asHub(r, prefix, rig) {
   const given = [];
   const isInstruction = (url) => url.pathname === `/api/v1/rigs/${rig}/instructions`;
   await r.page.route(isInstruction, async (route) => {
+    const name = `rigs/${rig}/instructions/7`;
+    if (route.request().method() === 'GET') {
+      const createTime = new Date().toISOString();
+      const instructions = given.map((call) =>
+        ({ ...call, name, createTime, caller: 'local', state: 'PENDING', message: '' }));
+      await route.fulfill({ json: { instructions, nextPageToken: '' } });
+      return;
+    }
     given.push(route.request().postDataJSON());
-    await route.fulfill({ json: { name: `rigs/${rig}/instructions/7` } });
+    await route.fulfill({ json: { name } });
   });
   const end = async () => {
     await r.page.unroute(isActivity);
@@ -34,6 +42,17 @@ async function seesGiven(r, rig) {
   const note = r.page.getByRole('status').filter({ hasText: `Instruction 7 was given to the device of rig ${rig},` });
   const link = note.getByRole('link', { name: 'Instructions' });
   assert.equal(await link.getAttribute('href'), `/rigs/${rig}/instructions`);
+}
+
+// Asks on the page of a segment, SESSION~INDEX, of the tablet for its quarantine.
+async function quarantine(r, segment, reason) {
+  await r.open('/rigs/tablet/segments/' + segment, 'Segment ' + segment);
+  await r.page.getByRole('button', { name: 'Quarantine' }).click();
+  const dialog = r.page.getByRole('dialog');
+  await dialog.getByText('it gets an instruction').waitFor();
+  await dialog.getByLabel('Reason').fill(reason);
+  await dialog.getByRole('button', { name: 'Quarantine' }).click();
+  return dialog;
 }
 
 export const hubTests = {
@@ -103,6 +122,58 @@ export const hubTests = {
     assert.equal(reason, 'the hub asks for it');
     assert.equal((await r.api('rigs/tablet/calibrations/active')).version, version);
     await end();
+  },
+
+  async 'a segment of a rig that a device reports is quarantined by the device'(r) {
+    const { segments } = await r.api('rigs/tablet/segments?view=BASIC');
+    const { name } = segments.find(({ state }) => state === 'SCORED');
+    const segment = name.slice(name.lastIndexOf('/') + 1);
+    const [session, index] = segment.split('~');
+    const reason = 'the camera was covered';
+    const { given, end } = await asHub(r, 'tablet', 'tablet');
+    const dialog = await quarantine(r, segment, reason);
+    await dialog.waitFor({ state: 'detached' });
+    await seesGiven(r, 'tablet');
+    await r.sees('only the device can delete the segment');
+    assert.equal(await r.page.getByRole('button', { name: 'Delete' }).count(), 0);
+    await r.picture('quarantine-at-hub');
+    assert.deepEqual(given, [
+      { quarantineSegments: { parent: 'rigs/tablet', session, index, reason } },
+    ]);
+    await r.page.getByRole('status').getByRole('link', { name: 'Instructions' }).click();
+    await r.heading('Instructions for tablet');
+    await r.sees(`quarantine segment ${segment}: ${reason}`);
+    await end();
+
+    // This daemon understands the instruction, and knows of no device.
+    const toDaemon = await asHub(r, 'tablet', 'none');
+    r.expectProblems = true;
+    const refused = await quarantine(r, segment, reason);
+    await refused.getByRole('alert').getByText('no device reports rig tablet').waitFor();
+    await toDaemon.end();
+    r.expectProblems = false;
+    assert.equal((await r.api(name)).state, 'SCORED');
+  },
+
+  async 'a segment is not offered for deletion before it is known who reports the rig'(r) {
+    const isActivity = (url) => url.pathname === '/api/v1/activity';
+    let release;
+    const released = new Promise((resolve) => {
+      release = resolve;
+    });
+    await r.page.route(isActivity, async (route) => {
+      await released;
+      await route.continue();
+    });
+    const asked = r.page.waitForRequest((request) => isActivity(new URL(request.url())));
+    await r.open('/rigs/tablet/segments/walk~0', 'Segment walk~0');
+    await asked;
+    await r.sees('from the session');
+    const button = r.page.getByRole('button', { name: 'Delete', exact: true });
+    assert.equal(await button.count(), 0);
+    release();
+    await button.waitFor();
+    await r.page.unroute(isActivity);
   },
 
   async 'labels of a rig that a device reports are changed by the device'(r) {

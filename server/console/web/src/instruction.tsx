@@ -7,7 +7,10 @@ import type { RigUpdate } from './rig_update';
 import { useRead, type Read } from './state';
 
 // The call that the device makes.
-export type InstructedCall = Pick<Instruction, 'activateCalibration' | 'startRecalibration'> & {
+export type InstructedCall = Pick<
+  Instruction,
+  'activateCalibration' | 'startRecalibration' | 'quarantineSegments'
+> & {
   updateRig?: RigUpdate;
 };
 
@@ -20,6 +23,11 @@ export async function instruct(rig: string, call: InstructedCall): Promise<Instr
 export function useActivity(rig: string, version: number): Read<ListActivityResponse> {
   const filter = new URLSearchParams({ filter: `name = "${rig}"` });
   return useRead(`activity?${filter}`, version);
+}
+
+// True if a device reports the rig of this activity.
+export function isReported({ rigs }: ListActivityResponse): boolean {
+  return rigs.some((rig) => rig.device !== undefined);
 }
 
 // States that the instruction was given, and where its result is shown.

@@ -15,7 +15,7 @@ import type {
 } from '../contract';
 import { component, heading, number, shown, sigmaText, valueText, words } from '../format';
 import { History } from '../history';
-import { Given, instruct, useActivity } from '../instruction';
+import { Given, instruct, isReported, useActivity } from '../instruction';
 import {
   Badge,
   Figures,
@@ -364,11 +364,11 @@ export function Calibrations(props: { rig: string; caller: Caller | null; versio
               <Comparison rig={props.rig} of={calibrations} />
               {asked && (
                 <Loaded read={activity}>
-                  {({ rigs: [found] }) => (
+                  {(found) => (
                     <Activate
                       calibration={asked}
                       active={active}
-                      isReported={found?.device !== undefined}
+                      isReported={isReported(found)}
                       onGiven={setGiven}
                       onEnd={() => {
                         setAsked(null);

@@ -14,7 +14,10 @@ function requestOf(instruction: Instruction): string {
   if (updateRig) return 'change the rig';
   if (startRecalibration) return 'recalibrate';
   if (quarantineSegments) {
-    return `quarantine segments of session ${quarantineSegments.session}: ${quarantineSegments.reason}`;
+    const { session, index, reason } = quarantineSegments;
+    const which =
+      index === undefined ? `segments of session ${session}` : `segment ${session}~${index}`;
+    return `quarantine ${which}: ${reason}`;
   }
   return 'unknown';
 }

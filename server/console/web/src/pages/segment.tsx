@@ -1,6 +1,6 @@
 import { useMemo, useState } from 'preact/hooks';
-import { ActionDialog, mayAdminister } from '../action';
-import { idOf, pageOf, post, remove, rigPath } from '../api';
+import { mayAdminister } from '../action';
+import { idOf, pageOf, rigPath } from '../api';
 import type {
   Caller,
   GroupScore,
@@ -26,8 +26,9 @@ import {
   Title,
   When,
 } from '../parts';
-import { go, useRead } from '../state';
+import { useRead } from '../state';
 import { Data } from './motion';
+import { SegmentAdministration } from './segment_administration';
 import { sessionOf } from './session';
 import { DataTable, type Column } from '../table';
 
@@ -233,59 +234,6 @@ function Parameters(props: { of: SegmentInformation_Component[] }) {
   );
 }
 
-// What an administrator may do with a segment.
-function Administration(props: { rig: string; segment: Segment; onChange: () => void }) {
-  const [asked, setAsked] = useState<'quarantine' | 'delete' | null>(null);
-  const key = decodeURIComponent(idOf(props.segment.name));
-  const at = key.lastIndexOf('~');
-  return (
-    <p class="buttons">
-      <button type="button" onClick={() => setAsked('quarantine')}>
-        Quarantine
-      </button>
-      <button type="button" onClick={() => setAsked('delete')}>
-        Delete
-      </button>
-      {asked === 'quarantine' && (
-        <ActionDialog
-          title={`Quarantine the segment ${key}?`}
-          button="Quarantine"
-          act={async (reason) => {
-            await post(rigPath(props.rig) + '/segments:quarantine', {
-              session: key.slice(0, at),
-              index: key.slice(at + 1),
-              reason,
-            });
-            props.onChange();
-          }}
-          onEnd={() => setAsked(null)}
-        >
-          <p>It leaves the tables, and no calibration uses it any more. This cannot be undone.</p>
-        </ActionDialog>
-      )}
-      {asked === 'delete' && (
-        <ActionDialog
-          title={`Delete the segment ${key}?`}
-          button="Delete"
-          act={async (reason) => {
-            await remove(
-              `${rigPath(props.rig)}/segments/${encodeURIComponent(idOf(props.segment.name))}`,
-              reason,
-            );
-            go(`/rigs/${props.rig}/segments`);
-          }}
-          onEnd={() => setAsked(null)}
-        >
-          <p>
-            Its data, its score and its place in tables are deleted. This cannot be undone. A
-            segment that a calibration was computed from is refused: quarantine it instead.
-          </p>
-        </ActionDialog>
-      )}
-    </p>
-  );
-}
-
 export function SegmentPage(props: {
   rig: string;
   caller: Caller | null;
@@ -370,9 +318,9 @@ export function SegmentPage(props: {
               .
             </p>
             {mayAdminister(props.caller, 'rigs/' + props.rig) && (
-              <Administration
-                rig={props.rig}
-                segment={segment}
+              <SegmentAdministration
+                of={segment}
+                version={props.version}
                 onChange={() => setChanged(changed + 1)}
               />
             )}
