@@ -176,6 +176,17 @@ export const hubTests = {
     await r.page.unroute(isActivity);
   },
 
+  async 'deleting a rig that a device reports deletes the copy at the hub'(r) {
+    const { end } = await asHub(r, 'tablet', 'tablet');
+    await r.open('/rigs/tablet', 'tablet');
+    await r.page.getByRole('button', { name: 'Delete rig' }).click();
+    const dialog = r.page.getByRole('dialog');
+    await dialog.getByText('only the copy at this hub is deleted').waitFor();
+    await dialog.getByRole('button', { name: 'Cancel' }).click();
+    await dialog.waitFor({ state: 'detached' });
+    await end();
+  },
+
   async 'labels of a rig that a device reports are changed by the device'(r) {
     const { labels } = await r.api('rigs/tablet');
     const { given, end } = await asHub(r, 'tablet', 'tablet');

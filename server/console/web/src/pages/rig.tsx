@@ -5,6 +5,7 @@ import type {
   Calibration,
   Caller,
   Instruction,
+  ListActivityResponse,
   ListSegmentsResponse,
   ListTablesResponse,
   Rig,
@@ -14,13 +15,13 @@ import type {
 } from '../contract';
 import { number } from '../format';
 import { Histogram } from '../histogram';
-import { Given, useActivity } from '../instruction';
+import { Given, isReported, useActivity } from '../instruction';
 import { EditLabels, Labels } from '../labels';
 import { Certainty, knownOf } from '../parameters';
 import { Choice, Empty, Loaded, Meter, Problem, SegmentLink, Title } from '../parts';
 import { DeviceReports, RigVerdict, WhatChanged, WhatToDo } from './rig_summary';
 import { NewestSession } from './session';
-import { go, useRead } from '../state';
+import { go, useRead, type Read } from '../state';
 import { DataTable, type Column } from '../table';
 
 const kEntries: Column<Table_Entry>[] = [
@@ -139,7 +140,8 @@ function Entropies(props: { rig: string; groups: string[]; version: number }) {
   );
 }
 
-function Delete(props: { rig: string; onEnd: () => void }) {
+// The hub has a copy of a rig that a device reports, and deletes that.
+function Delete(props: { rig: string; isReported: boolean; onEnd: () => void }) {
   return (
     <ActionDialog
       title={`Delete the rig ${props.rig}?`}
@@ -150,10 +152,17 @@ function Delete(props: { rig: string; onEnd: () => void }) {
       }}
       onEnd={props.onEnd}
     >
-      <p>
-        All its segments, tables, runs and calibrations are deleted. This cannot be undone. The
-        event log keeps its events, and the reason.
-      </p>
+      {props.isReported ? (
+        <p>
+          A device reports this rig: only the copy at this hub is deleted. The event log keeps its
+          events, and the reason. If the device still reports, the rig comes back.
+        </p>
+      ) : (
+        <p>
+          All its segments, tables, runs and calibrations are deleted. This cannot be undone. The
+          event log keeps its events, and the reason.
+        </p>
+      )}
     </ActionDialog>
   );
 }
@@ -189,7 +198,9 @@ function Administration(props: {
             }}
           />
         )}
-        {asked === 'delete' && <Delete rig={props.rig} onEnd={() => setAsked(null)} />}
+        {asked === 'delete' && (
+          <Delete rig={props.rig} isReported={props.isReported} onEnd={() => setAsked(null)} />
+        )}
       </p>
     </>
   );
@@ -199,7 +210,7 @@ function Administration(props: {
 function Settings(props: {
   rig: string;
   of: Rig;
-  isReported: boolean;
+  activity: Read<ListActivityResponse>;
   caller: Caller | null;
   onChange: () => void;
 }) {
@@ -208,12 +219,16 @@ function Settings(props: {
       <h2>Labels</h2>
       <Labels of={props.of.labels} />
       {mayAdminister(props.caller, props.of.name) && (
-        <Administration
-          rig={props.rig}
-          of={props.of}
-          isReported={props.isReported}
-          onChange={props.onChange}
-        />
+        <Loaded read={props.activity}>
+          {(activity) => (
+            <Administration
+              rig={props.rig}
+              of={props.of}
+              isReported={isReported(activity)}
+              onChange={props.onChange}
+            />
+          )}
+        </Loaded>
       )}
     </section>
   );
@@ -226,7 +241,8 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
   const active = useRead<Calibration>(base + '/calibrations/active', props.version);
   const factory = useRead<Calibration>(base + '/calibrations/1');
   const tables = useRead<ListTablesResponse>(base + '/tables', props.version);
-  const activity = useActivity(props.rig, props.version).value?.rigs[0];
+  const activity = useActivity(props.rig, props.version);
+  const found = activity.value?.rigs[0];
   const known = useMemo(
     () => (active.value && factory.value ? knownOf(active.value, factory.value) : null),
     [active.value, factory.value],
@@ -255,13 +271,13 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
         {(value) => (
           <>
             <RigVerdict of={value.calibration} />
-            {activity?.device && <DeviceReports of={activity.device} />}
+            {found?.device && <DeviceReports of={found.device} />}
             <div class="side">
               <WhatChanged rig={props.rig} active={value.calibration} version={props.version} />
               <WhatToDo
                 rig={props.rig}
                 active={value.calibration}
-                activity={activity}
+                activity={found}
                 known={value.known}
                 version={props.version}
               />
@@ -282,7 +298,7 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
           <Settings
             rig={props.rig}
             of={rig.value}
-            isReported={activity?.device !== undefined}
+            activity={activity}
             caller={props.caller}
             onChange={() => setChanged(changed + 1)}
           />
