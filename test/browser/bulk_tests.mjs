@@ -39,6 +39,44 @@ async function changesIn(dialog) {
     all.map((row) => [...row.children].slice(0, 2).map((cell) => cell.textContent))));
 }
 
+// Asks for a roll-back with these choices.
+async function askRollBack(r, { since = '', again = false } = {}) {
+  const asked = await ask(r, 'Roll back these rigs');
+  const { dialog } = asked;
+  await dialog.getByLabel(/^Only where the active version was created since/).fill(since);
+  await dialog.getByLabel(/^also where a version was rolled back before/).setChecked(again);
+  await dialog.getByRole('button', { name: 'Continue' }).click();
+  return asked;
+}
+
+// Shows other versions of the tablet, [number, state] from the newest, which
+// are an hour old, and takes the activations.
+async function withVersions(r) {
+  const shown = { versions: [] };
+  const activated = [];
+  const createTime = new Date(Date.now() - 3_600_000).toISOString();
+  const path = '/api/v1/rigs/tablet/calibrations';
+  const isList = (url) => url.pathname === path;
+  await r.page.route(isList, (route) => {
+    const calibrations = shown.versions.map(([version, state]) => ({
+      name: `rigs/tablet/calibrations/${version}`, version: String(version), state, createTime,
+    }));
+    return route.fulfill({ json: { calibrations, nextPageToken: '' } });
+  });
+  const isActivation = (url) => url.pathname.startsWith(path + '/') &&
+    url.pathname.endsWith(':activate');
+  await r.page.route(isActivation, (route) => {
+    const { pathname } = new URL(route.request().url());
+    activated.push([pathname.slice(path.length + 1), route.request().postDataJSON()]);
+    return route.fulfill({ json: {} });
+  });
+  const end = async () => {
+    await r.page.unroute(isList);
+    await r.page.unroute(isActivation);
+  };
+  return { shown, activated, end };
+}
+
 export const bulkTests = {
   async 'rigs of a filter are recalibrated, and a failure does not hold up the others'(r) {
     await r.open('/', 'Rigs');
@@ -78,7 +116,7 @@ export const bulkTests = {
     const earlier = (await versions()).filter((c) => Number(c.version) < Number(newest.version));
     const before = earlier.find((c) => c.state === 'SUPERSEDED').version;
 
-    const { dialog, namesIn, titled, close } = await ask(r, 'Roll back these rigs');
+    const { dialog, namesIn, titled, close } = await askRollBack(r);
     await titled('Roll back 1 rig?');
     assert.deepEqual(await namesIn('Rigs to change'), ['tablet']);
     await dialog.getByText(`from version ${newest.version} to ${before}`).waitFor();
@@ -95,13 +133,72 @@ export const bulkTests = {
     await close();
     assert.equal((await r.api('rigs/tablet/calibrations/active')).version, before);
 
-    const again = await ask(r, 'Roll back these rigs');
+    const again = await askRollBack(r);
     await again.titled('Roll back: no rig to change');
     assert.deepEqual(await again.namesIn('Left out'), kLabelled);
     await again.dialog.getByText(/^It is rolled back already/).waitFor();
     await again.close();
     await r.change('POST', newest.name + ':activate', { reason: 'the test ends with it' });
     await r.shows('/rigs/tablet/events', 'Events of tablet', ['the batch is rolled back']);
+  },
+
+  async 'a roll-back leaves versions that are older than the given time'(r) {
+    const { shown, activated, end } = await withVersions(r);
+    shown.versions = [
+      [5, 'REJECTED'], [4, 'ACTIVE'], [3, 'ROLLED_BACK'], [2, 'SUPERSEDED'], [1, 'SUPERSEDED'],
+    ];
+    const older = await askRollBack(r, { since: '10m' });
+    await older.titled('Roll back: no rig to change');
+    await older.dialog.getByText(/^Its active version 4 was created before, at /).waitFor();
+    await older.close();
+
+    const { dialog, titled } = await askRollBack(r, { since: 'soon' });
+    await dialog.getByRole('alert').getByText("'soon' is not a time").waitFor();
+    await r.picture('bulk-rollback-choices');
+    const since = dialog.getByLabel(/^Only where/);
+    await since.fill('2026-02-30');
+    await dialog.getByRole('button', { name: 'Continue' }).click();
+    await dialog.getByRole('alert').getByText("'2026-02-30' is not a time").waitFor();
+    await since.fill('2h');
+    await dialog.getByRole('button', { name: 'Continue' }).click();
+    await titled('Roll back 1 rig?');
+    await dialog.getByText('Only versions that were created since').waitFor();
+    assert.deepEqual(await changesIn(dialog), { tablet: 'from version 4 to 2' });
+    await r.page.keyboard.press('Escape');
+    await dialog.waitFor({ state: 'detached' });
+    assert.deepEqual(activated, []);
+
+    // As a time in UTC, to the second before that of the versions.
+    const dayBefore = new Date(Date.now() - 86_400_000).toISOString().slice(0, 19);
+    const dated = await askRollBack(r, { since: dayBefore.replace('T', ' ') });
+    await dated.titled('Roll back 1 rig?');
+    await r.page.keyboard.press('Escape');
+    await dated.dialog.waitFor({ state: 'detached' });
+    await end();
+  },
+
+  async 'a roll-back goes further back on demand'(r) {
+    const { shown, activated, end } = await withVersions(r);
+    shown.versions = [
+      [5, 'REJECTED'], [4, 'ROLLED_BACK'], [3, 'ROLLED_BACK'], [2, 'ACTIVE'], [1, 'SUPERSEDED'],
+    ];
+    const once = await askRollBack(r);
+    await once.titled('Roll back: no rig to change');
+    await once.dialog.getByText(/^It is rolled back already, from version 4 to 2/).waitFor();
+    await once.close();
+
+    const { dialog, titled, close } = await askRollBack(r, { again: true });
+    await titled('Roll back 1 rig?');
+    await dialog.getByText('are rolled back further').waitFor();
+    assert.deepEqual(await changesIn(dialog), { tablet: 'from version 2 to 1' });
+    await dialog.getByLabel('Reason').fill('both were bad');
+    await dialog.getByRole('button', { name: 'Roll back', exact: true }).click();
+    await titled('Rolling back 1 rig: ended');
+    assert.equal(await dialog.getByRole('status').textContent(),
+      'The version before is active on 1 of 1 rig.');
+    await close();
+    assert.deepEqual(activated, [['1:activate', { reason: 'both were bad' }]]);
+    await end();
   },
 
   async 'rigs of a filter are labelled, and their other labels stay'(r) {

@@ -1,12 +1,7 @@
 // Changes of all rigs of a filter: which rigs each of them changes, and making
 // them. A rig that fails does not hold up the others.
-import { get, idOf, post } from './api';
-import type {
-  Calibration,
-  ListActivityResponse,
-  ListCalibrationsResponse,
-  RigActivity,
-} from './contract';
+import { get, post } from './api';
+import type { ListActivityResponse, RigActivity } from './contract';
 import { instruct, type InstructedCall } from './instruction';
 
 // The statement of the administrator who confirms the changes.
@@ -53,7 +48,8 @@ export interface BulkAction {
 const kAtOnce = 4;
 const kPageSize = '500';
 
-async function readAll<R extends { nextPageToken: string }, T>(
+// Reads all pages of a list.
+export async function readAll<R extends { nextPageToken: string }, T>(
   path: string,
   query: Record<string, string>,
   itemsOf: (response: R) => T[],
@@ -142,47 +138,4 @@ export const kRecalibrate: BulkAction = {
         instruction: { startRecalibration: { parent: rig.name, force } },
       }),
     }),
-};
-
-// The change that makes the version before the active one active again, or why
-// there is none. The versions are ordered from the newest.
-function rollbackOf(rig: RigActivity, versions: Calibration[]): RigChange | string {
-  const at = versions.findIndex((version) => version.state === 'ACTIVE');
-  if (at < 0) return 'It has no active version.';
-  const active = versions[at].version;
-  const undone = versions.slice(0, at).find((version) => version.state === 'ROLLED_BACK');
-  if (undone) {
-    return `It is rolled back already, from version ${undone.version} to ${active}.`;
-  }
-  const before = versions.slice(at + 1).find((version) => version.state === 'SUPERSEDED');
-  if (!before) return `No version was active before version ${active}.`;
-  const { name } = before;
-  return {
-    rig: rig.name,
-    effect: `from version ${active} to ${idOf(name)}`,
-    isReported: rig.device !== undefined,
-    call: ({ reason }) => ({
-      make: () => post(name + ':activate', { reason }),
-      instruction: { activateCalibration: { name, reason } },
-    }),
-  };
-}
-
-export const kRollBack: BulkAction = {
-  imperative: 'Roll back',
-  progressive: 'Rolling back',
-  result: 'The version before is active',
-  explanation:
-    'Every device that watches these rigs receives the version at once. The event logs record the reason.',
-  takes: 'reason',
-  plan: async (rig, signal) =>
-    rollbackOf(
-      rig,
-      await readAll(
-        rig.name + '/calibrations',
-        { view: 'BASIC' },
-        (response: ListCalibrationsResponse) => response.calibrations,
-        signal,
-      ),
-    ),
 };

@@ -5,8 +5,10 @@ import { useState } from 'preact/hooks';
 import { ActionForm, Dialog } from './action';
 import { Failure } from './api';
 import type { BulkAction } from './bulk';
+import { rollbackAction } from './bulk_rollback';
 import { kSettings, labelAction, settingsAction, type Setting } from './bulk_updates';
 import { linesOf, parseLabels } from './labels';
+import { kTimeHint, timeOf } from './time_input';
 
 export interface BulkForm {
   imperative: string; // as that of the action
@@ -23,6 +25,43 @@ function invalid(message: string, whatToDo: string): Failure {
 }
 
 const nothing = () => invalid('There is nothing to change.', 'Fill in at least one field.');
+
+function RollbackForm(props: FormProps) {
+  const [since, setSince] = useState('');
+  const [again, setAgain] = useState(false);
+  const act = () => {
+    const text = since.trim();
+    const time = timeOf(text, new Date());
+    if (text !== '' && time === null) throw invalid(`'${text}' is not a time.`, kTimeHint);
+    props.onAction(rollbackAction({ since: time, again }));
+    return Promise.resolve();
+  };
+  return (
+    <Dialog title="Roll back these rigs" onEnd={props.onEnd}>
+      <ActionForm button="Continue" act={act} onCancel={props.onEnd} withoutReason>
+        <label>
+          Only where the active version was created since then: a time in UTC, or 2d
+          <input
+            type="text"
+            value={since}
+            placeholder="any time"
+            onInput={(event) => setSince(event.currentTarget.value)}
+          />
+        </label>
+        <div class="bar">
+          <label>
+            <input
+              type="checkbox"
+              checked={again}
+              onChange={(event) => setAgain(event.currentTarget.checked)}
+            />
+            also where a version was rolled back before, and no newer one has become active since
+          </label>
+        </div>
+      </ActionForm>
+    </Dialog>
+  );
+}
 
 function LabelForm(props: FormProps) {
   const [set, setSet] = useState('');
@@ -92,5 +131,6 @@ function SettingsForm(props: FormProps) {
   );
 }
 
+export const kRollBack: BulkForm = { imperative: 'Roll back', Form: RollbackForm };
 export const kLabel: BulkForm = { imperative: 'Label', Form: LabelForm };
 export const kConfigure: BulkForm = { imperative: 'Configure', Form: SettingsForm };

@@ -1,9 +1,9 @@
 import { useState } from 'preact/hooks';
 import { mayAdminister } from '../action';
 import { idOf, pageOf } from '../api';
-import { kRecalibrate, kRollBack, type BulkAction } from '../bulk';
+import { kRecalibrate, type BulkAction } from '../bulk';
 import { BulkDialog } from '../bulk_dialog';
-import { kConfigure, kLabel, type BulkForm } from '../bulk_forms';
+import { kConfigure, kLabel, kRollBack, type BulkForm } from '../bulk_forms';
 import type { Caller, ListActivityResponse, ReportState, RigActivity } from '../contract';
 import { RigFilter } from '../fleet';
 import { Labels } from '../labels';
