@@ -268,6 +268,13 @@ absl::Status Domain::NoteOutdatedScores(const RigClaim& claim) {
   });
 }
 
+absl::Status Domain::NoteCandidateScores(const RigClaim& claim,
+                                         std::int64_t run) {
+  return ChangeOwnRigOnly(store_, claim, clock_(), [run](UnitOfWork* tx) {
+    return server::NoteCandidateScores(tx, run);
+  });
+}
+
 absl::Status Domain::EndRescoring(const RigClaim& claim,
                                   const ScoreBasis& basis) {
   return ChangeOwnRigOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {

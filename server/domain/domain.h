@@ -102,8 +102,8 @@ class Domain {
 
   // Replaces the score of a scored segment by a later one, also in the tables
   // that hold it. Changes nothing if its data is gone. FAILED_PRECONDITION
-  // unless `basis` is the present one: another activation, or another prior,
-  // has scores of its own.
+  // unless `basis` is the present one: another activation, another prior, or a
+  // run that scores at its candidate has scores of its own.
   absl::Status ReplaceScore(const RigClaim& claim,
                             const ScoreBasis& basis,
                             const SegmentKey& key,
@@ -112,6 +112,8 @@ class Domain {
 
   // NoteOutdatedScores of outdated_scores.h.
   absl::Status NoteOutdatedScores(const RigClaim& claim);
+  // NoteCandidateScores of outdated_scores.h.
+  absl::Status NoteCandidateScores(const RigClaim& claim, std::int64_t run);
   // All scored segments whose data is kept, and can be read, have scores of
   // this basis: none is outdated any more. Changes nothing if the basis is not
   // the present one.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "server/domain/calibration_life.h"
+#include "server/domain/outdated_scores.h"
 #include "server/domain/retention.h"
 #include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
@@ -84,19 +85,27 @@ absl::StatusOr<StoredRun> BeginRun(UnitOfWork* tx, std::int64_t run_number) {
 }
 
 absl::StatusOr<StoredRun> ReleaseRun(UnitOfWork* tx, std::int64_t run_number) {
-  SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRun(tx, run_number));
-  if (run.state != RunState::kRunning) {
-    return absl::FailedPreconditionError(fmt::format(
-        "recalibration {} of rig {} is not running", run.run, run.rig));
-  }
+  SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRunningRun(tx, run_number));
   run.state = RunState::kPending;
   --run.attempts;
   SELFCAL_RETURN_IF_ERROR(UpdateRun(tx, run));
+  SELFCAL_RETURN_IF_ERROR(EndCandidateScores(tx));
+  return run;
+}
+
+absl::StatusOr<StoredRun> ReadRunningRun(UnitOfWork* tx,
+                                         std::int64_t run_number) {
+  SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRun(tx, run_number));
+  if (run.state != RunState::kRunning) {
+    return absl::FailedPreconditionError(fmt::format(
+        "recalibration {} of rig {} is not running", run_number, tx->rig()));
+  }
   return run;
 }
 
 absl::Status WriteEnd(UnitOfWork* tx, const StoredRun& run) {
   SELFCAL_RETURN_IF_ERROR(UpdateRun(tx, run));
+  SELFCAL_RETURN_IF_ERROR(EndCandidateScores(tx));
   return AppendEvent(tx, EventKind::kRunEnded, EndText(run));
 }
 

@@ -23,7 +23,11 @@ absl::StatusOr<StoredRun> EndRun(UnitOfWork* tx,
                                  RunState state,
                                  const std::string& message);
 
-// Writes the state of a run that has ended, and the event.
+// FAILED_PRECONDITION if the run is not running.
+absl::StatusOr<StoredRun> ReadRunningRun(UnitOfWork* tx, std::int64_t run);
+
+// Writes the state of a run that has ended, and the event. Scores that it has
+// written at its candidate are outdated from then on (outdated_scores.h).
 absl::Status WriteEnd(UnitOfWork* tx, const StoredRun& run);
 
 }  // namespace selfcal::server

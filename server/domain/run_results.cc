@@ -25,15 +25,6 @@
 namespace selfcal::server {
 namespace {
 
-absl::StatusOr<StoredRun> ReadRunningRun(UnitOfWork* tx, std::int64_t number) {
-  SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRun(tx, number));
-  if (run.state != RunState::kRunning) {
-    return absl::FailedPreconditionError(fmt::format(
-        "recalibration {} of rig {} is not running", number, tx->rig()));
-  }
-  return run;
-}
-
 // Returns the candidate of the run, and stores it if there is none yet.
 absl::StatusOr<StoredCalibration> EnsureCandidate(
     UnitOfWork* tx,

@@ -6,6 +6,7 @@
 
 #include "server/domain/admission.h"
 #include "server/domain/device_change.h"
+#include "server/domain/outdated_scores.h"
 #include "server/domain/remembered.h"
 #include "server/domain/report_data.h"
 #include "server/domain/retention.h"
@@ -17,6 +18,37 @@
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
+namespace {
+
+// FAILED_PRECONDITION unless scores may be replaced by those of this basis.
+absl::Status CheckBasis(UnitOfWork* tx,
+                        const Rig& rig,
+                        const ScoreBasis& basis) {
+  SELFCAL_ASSIGN_OR_RETURN(const ScoreBasis present, PresentBasis(tx, rig));
+  if (present.active != basis.active) {
+    return absl::FailedPreconditionError(
+        fmt::format("version {} of rig {} is active by now, not {}",
+                    present.active,
+                    tx->rig(),
+                    basis.active));
+  }
+  if (present.prior_sigmas != basis.prior_sigmas) {
+    return absl::FailedPreconditionError(
+        fmt::format("rig {} has another prior by now", tx->rig()));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t run, RunAtCandidate(tx));
+  if (run == basis.run) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      basis.run == 0
+          ? fmt::format("run {} of rig {} scores the segments at its candidate",
+                        run,
+                        tx->rig())
+          : fmt::format("run {} of rig {} no longer scores at its candidate",
+                        basis.run,
+                        tx->rig()));
+}
+
+}  // namespace
 
 absl::StatusOr<ScoreBasis> PresentBasis(UnitOfWork* tx, const Rig& rig) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active, ActiveVersion(tx));
@@ -85,18 +117,7 @@ absl::Status ReplaceScore(UnitOfWork* tx,
                           const SegmentInformation& information,
                           const SegmentEnds& ends) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
-  SELFCAL_ASSIGN_OR_RETURN(const ScoreBasis present, PresentBasis(tx, rig.rig));
-  if (present.active != basis.active) {
-    return absl::FailedPreconditionError(
-        fmt::format("version {} of rig {} is active by now, not {}",
-                    present.active,
-                    tx->rig(),
-                    basis.active));
-  }
-  if (present != basis) {
-    return absl::FailedPreconditionError(
-        fmt::format("rig {} has another prior by now", tx->rig()));
-  }
+  SELFCAL_RETURN_IF_ERROR(CheckBasis(tx, rig.rig, basis));
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
   SELFCAL_ASSIGN_OR_RETURN(const bool has_data, HasData(tx, segment.sequence));
   if (segment.state != SegmentState::kScored || !has_data) {

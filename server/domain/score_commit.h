@@ -24,13 +24,18 @@ namespace selfcal::server {
 struct ScoreBasis {
   std::int64_t active = 0;       // version
   Eigen::VectorXd prior_sigmas;  // of the rig
+  // Run at whose candidate it is scored instead, which was validated against
+  // the active version; 0: none.
+  std::int64_t run = 0;
 
   bool operator==(const ScoreBasis& other) const {
-    return active == other.active && prior_sigmas == other.prior_sigmas;
+    return active == other.active && prior_sigmas == other.prior_sigmas &&
+           run == other.run;
   }
 };
 
-// The basis with which a segment of the rig is to be scored at present.
+// The basis with which a new segment of the rig is to be scored at present,
+// which is never a candidate.
 absl::StatusOr<ScoreBasis> PresentBasis(UnitOfWork* tx, const Rig& rig);
 
 // Result of the commit of a score.

@@ -83,7 +83,8 @@ class Recalibrator {
   // Creates the runs of times and of sessions that have ended.
   absl::Status StartDueRuns();
   // Computes outdated scores again, of rigs for which nobody has ended that in
-  // time: it has failed, or its daemon has ended.
+  // time: it has failed, or its daemon has ended. A rig whose run scores at its
+  // candidate waits for the end of the run.
   absl::Status ResumeRescoring(const Executor& executor);
   // Executes the run if the work of its rig is this daemon's, and no other
   // thread does it.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <optional>
 #include <utility>
 
 #include "core/change/concerned.h"
@@ -220,24 +221,31 @@ absl::StatusOr<StoredCalibration> ValidateAndFinish(
     const RunContext& context,
     const StoredRun& run,
     StoredCalibration candidate) {
+  std::optional<CandidateScores> scores;  // of the last validation with any
   for (;;) {
     SELFCAL_ASSIGN_OR_RETURN(const std::string finding,
                              Validate(context, run, &candidate));
-    // Before the run ends, so that a crash between the two repeats it, and
-    // whoever sees the version sees the scores at it.
-    const bool becomes_active = candidate.state == CalibrationState::kActive;
-    const bool rescored =
-        !becomes_active || RescoreKept(context.domain,
-                                       context.estimators,
-                                       context.claim,
-                                       candidate.validation->active_version,
-                                       candidate.theta);
+    // The run ends after that, so that whoever sees the version sees the scores
+    // at it. A crash between the two repeats it, or leaves a record by which
+    // the scores are repaired.
+    if (candidate.state == CalibrationState::kActive &&
+        context.estimators.ends) {
+      SELFCAL_ASSIGN_OR_RETURN(scores,
+                               RescoreAtCandidate(context.domain,
+                                                  context.estimators,
+                                                  context.claim,
+                                                  run.run,
+                                                  candidate));
+    }
     auto finished =
         context.domain->FinishRun(context.claim, run.run, candidate, finding);
     if (absl::IsAborted(finished.status())) continue;
-    if (becomes_active && finished.ok() &&
-        (!rescored || finished->state != CalibrationState::kActive)) {
-      RescoreAtActive(context.domain, context.estimators, context.claim);
+    if (finished.ok() && scores) {
+      EndRescoringOfRun(context.domain,
+                        context.estimators,
+                        context.claim,
+                        *finished,
+                        *scores);
     }
     return finished;
   }

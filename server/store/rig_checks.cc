@@ -38,6 +38,18 @@ absl::StatusOr<std::vector<std::string>> RigsToCheck(Connection* db,
   return names;
 }
 
+absl::StatusOr<std::optional<std::int64_t>> NextCheck(UnitOfWork* tx,
+                                                      RigCheck check) {
+  Statement read(
+      tx->db(),
+      fmt::format("SELECT {} FROM rigs WHERE rig = ?1", ColumnOf(check)),
+      tx->rig_row());
+  std::optional<std::int64_t> next_ns;
+  if (read.Next() && !read.IsNull(0)) next_ns = read.Int(0);
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return next_ns;
+}
+
 absl::Status SetCheck(UnitOfWork* tx,
                       RigCheck check,
                       std::optional<std::int64_t> next_ns) {

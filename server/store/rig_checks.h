@@ -22,7 +22,7 @@ enum class RigCheck {
   kScores,   // whether outdated scores were computed again, if it has any
 };
 
-// No check before the rig changes.
+// No check before the rig changes or, of its scores, before its run ends.
 inline constexpr std::int64_t kNoCheck =
     std::numeric_limits<std::int64_t>::max();
 
@@ -31,6 +31,10 @@ absl::StatusOr<std::vector<std::string>> RigsToCheck(Connection* db,
                                                      RigCheck check,
                                                      std::int64_t until_ns,
                                                      int limit);
+
+// The steady time of the next check, as SetCheck has set it.
+absl::StatusOr<std::optional<std::int64_t>> NextCheck(UnitOfWork* tx,
+                                                      RigCheck check);
 
 // Sets the steady time of the next check; nullopt: none before the policy
 // changes (kTime), or scores become outdated (kScores).

@@ -51,6 +51,32 @@ class OutdatedScoresTest : public StoreTest {
   ScoreBasis Basis(std::int64_t active) const {
     return {active, PriorSigmas(rig_)};
   }
+  absl::Status Replace(const ScoreBasis& basis, double entropy) {
+    return domain_->ReplaceScore("a",
+                                 basis,
+                                 {"s", 1},
+                                 FakeInformation(rig_, entropy),
+                                 FakeEnds(rig_, {"s", 1}));
+  }
+  // Begins the run of the two segments, whose scores at its candidate are of
+  // the basis that is returned.
+  ScoreBasis ScoreAtCandidate() {
+    EXPECT_TRUE(domain_->BeginRun("a", 1).ok());
+    EXPECT_TRUE(domain_->NoteCandidateScores("a", 1).ok());
+    ScoreBasis basis = Basis(1);
+    basis.run = 1;
+    EXPECT_TRUE(Replace(basis, -80).ok());
+    return basis;
+  }
+  StoredCalibration Result(CalibrationState state) const {
+    StoredCalibration result;
+    result.state = state;
+    if (state == CalibrationState::kRejected) result.reasons = {"no use"};
+    result.theta = rig_.factory;
+    const int size = TangentSize(result.theta);
+    result.covariance = Eigen::MatrixXd::Identity(size, size);
+    return result;
+  }
   double Entropy() {
     return store_->GetSegment("a", {"s", 1})->information->groups[0].entropy;
   }
@@ -80,12 +106,8 @@ TEST_P(OutdatedScoresTest, OthersTakeOverAfterAMinute) {
 
 TEST_P(OutdatedScoresTest, ScoresAreOutdatedAfterAnActivation) {
   ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
-  StoredCalibration next;
-  next.state = CalibrationState::kActive;
-  next.theta = rig_.factory;
-  const int size = TangentSize(next.theta);
-  next.covariance = Eigen::MatrixXd::Identity(size, size);
-  ASSERT_TRUE(domain_->FinishRun("a", 1, next).ok());
+  ASSERT_TRUE(
+      domain_->FinishRun("a", 1, Result(CalibrationState::kActive)).ok());
   EXPECT_THAT(Outdated(), IsEmpty());
   ASSERT_TRUE(domain_->ActivateCalibration("a", 1, "me", "back").ok());
   EXPECT_THAT(Outdated(), ElementsAre("a"));
@@ -106,18 +128,78 @@ TEST_P(OutdatedScoresTest, ARescoringWithAnEarlierPriorEndsNothing) {
 }
 
 TEST_P(OutdatedScoresTest, NoScoreWithAnEarlierPriorTakesThePlaceOfALaterOne) {
-  const auto replace = [&](const ScoreBasis& basis, double entropy) {
-    return domain_->ReplaceScore("a",
-                                 basis,
-                                 {"s", 1},
-                                 FakeInformation(rig_, entropy),
-                                 FakeEnds(rig_, {"s", 1}));
-  };
   const ScoreBasis earlier = Basis(1);
   ChangePrior();
-  EXPECT_TRUE(replace(Basis(1), -60).ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(replace(earlier, -70)));
+  EXPECT_TRUE(Replace(Basis(1), -60).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(Replace(earlier, -70)));
   EXPECT_EQ(Entropy(), -60);
+}
+
+// Nobody else computes them before the run ends, however long it takes.
+TEST_P(OutdatedScoresTest, ScoresAtACandidateAreRecordedUntilItsRunEnds) {
+  ScoreAtCandidate();
+  Reopen();
+  EXPECT_THAT(Outdated(), ElementsAre("a"));
+  EXPECT_THAT(Outdated(kNoCheck - 1), IsEmpty());
+}
+
+TEST_P(OutdatedScoresTest, ARejectionMakesTheScoresAtTheCandidateOutdated) {
+  ScoreAtCandidate();
+  ASSERT_TRUE(
+      domain_->FinishRun("a", 1, Result(CalibrationState::kRejected)).ok());
+  EXPECT_THAT(Outdated(NowNs()), IsEmpty());
+  EXPECT_THAT(Outdated(NowNs() + 61'000'000'000), ElementsAre("a"));
+  EXPECT_TRUE(Replace(Basis(1), -50).ok());
+  ASSERT_TRUE(domain_->EndRescoring("a", Basis(1)).ok());
+  EXPECT_THAT(Outdated(), IsEmpty());
+}
+
+TEST_P(OutdatedScoresTest, ARunThatEndsWithoutAVersionLeavesOutdatedScores) {
+  ScoreAtCandidate();
+  ASSERT_TRUE(domain_->EndRun("a", 1, RunState::kFailed, "no use").ok());
+  EXPECT_THAT(Outdated(NowNs() + 61'000'000'000), ElementsAre("a"));
+}
+
+TEST_P(OutdatedScoresTest, ARunThatIsReleasedLeavesOutdatedScores) {
+  const ScoreBasis at_candidate = ScoreAtCandidate();
+  ASSERT_TRUE(domain_->ReleaseRun("a", 1).ok());
+  EXPECT_THAT(Outdated(NowNs() + 61'000'000'000), ElementsAre("a"));
+  EXPECT_TRUE(Replace(Basis(1), -50).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(Replace(at_candidate, -90)));
+  EXPECT_EQ(Entropy(), -50);
+}
+
+TEST_P(OutdatedScoresTest, ScoresAtACandidateThatBecomesActiveAreNotOutdated) {
+  ScoreAtCandidate();
+  ASSERT_TRUE(
+      domain_->FinishRun("a", 1, Result(CalibrationState::kActive)).ok());
+  ASSERT_TRUE(domain_->EndRescoring("a", Basis(1)).ok());
+  EXPECT_THAT(Outdated(), ElementsAre("a"));
+  ASSERT_TRUE(domain_->EndRescoring("a", Basis(2)).ok());
+  EXPECT_THAT(Outdated(), IsEmpty());
+}
+
+// Scores of two versions are never mixed.
+TEST_P(OutdatedScoresTest, OnlyARunReplacesScoresWhileItScoresAtItsCandidate) {
+  const ScoreBasis at_candidate = ScoreAtCandidate();
+  ASSERT_TRUE(domain_->NoteOutdatedScores("a").ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(Replace(Basis(1), -50)));
+  ASSERT_TRUE(domain_->EndRescoring("a", Basis(1)).ok());
+  EXPECT_THAT(Outdated(kNoCheck - 1), IsEmpty());
+  EXPECT_THAT(Outdated(), ElementsAre("a"));
+  EXPECT_EQ(Entropy(), -80);
+  // Its daemon may learn later that another one has cancelled it.
+  ASSERT_TRUE(domain_->EndRun("a", 1, RunState::kCancelled, "on request").ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(Replace(at_candidate, -90)));
+  EXPECT_EQ(Entropy(), -80);
+}
+
+TEST_P(OutdatedScoresTest, ARunThatIsNotRunningScoresAtNoCandidate) {
+  EXPECT_TRUE(absl::IsFailedPrecondition(domain_->NoteCandidateScores("a", 1)));
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(domain_->EndRun("a", 1, RunState::kFailed, "no use").ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(domain_->NoteCandidateScores("a", 1)));
+  EXPECT_THAT(Outdated(), IsEmpty());
 }
 
 }  // namespace
