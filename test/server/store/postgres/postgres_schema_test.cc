@@ -164,7 +164,7 @@ TEST_F(PostgresSchemaTest, SegmentsOfAllRigsCanBeReadFromTheIndexOfTheirList) {
       ASSERT_TRUE(after.ok()) << after.status();
       SqlCondition condition;
       const std::string sql =
-          SelectSegments("s.session", 0, query, {}, *after, 51, &condition);
+          SelectPlaces(0, query, {}, *after, 51, &condition);
       Statement plan(db_.get(), "EXPLAIN " + sql);
       condition.Bind(&plan);
       std::string steps;
@@ -184,14 +184,36 @@ TEST_F(PostgresSchemaTest, ExclusionsOfARigForARareCauseAreReadFromTheirIndex) {
   SqlCondition condition;
   Statement plan(
       db_.get(),
-      "EXPLAIN " +
-          SelectSegments(
-              "s.session", 7, query, {}, std::nullopt, 51, &condition));
+      "EXPLAIN " + SelectPlaces(7, query, {}, std::nullopt, 51, &condition));
   condition.Bind(&plan);
   std::string steps;
   while (plan.Next()) steps += plan.Text(0) + "\n";
   EXPECT_TRUE(plan.status().ok()) << plan.status();
   EXPECT_THAT(steps, HasSubstr("rare_absences_of_rig"));
+}
+
+// The rows of a rig lie apart.
+TEST_F(PostgresSchemaTest, APageOfARigIsFoundWithoutItsRows) {
+  ASSERT_TRUE(db_->Execute("SET enable_seqscan = off; SET enable_sort = off;"
+                           "SET enable_bitmapscan = off")
+                  .ok());
+  using Order = SegmentQuery::Order;
+  for (const Order order : {Order::kArrival,
+                            Order::kLandmarks,
+                            Order::kTemperature,
+                            Order::kAngularRate}) {
+    SegmentQuery query;
+    query.order = order;
+    SqlCondition condition;
+    Statement plan(
+        db_.get(),
+        "EXPLAIN " + SelectPlaces(7, query, {}, std::nullopt, 51, &condition));
+    condition.Bind(&plan);
+    std::string steps;
+    while (plan.Next()) steps += plan.Text(0) + "\n";
+    EXPECT_TRUE(plan.status().ok()) << plan.status();
+    EXPECT_THAT(steps, HasSubstr("Index Only Scan Backward"));
+  }
 }
 
 TEST_F(PostgresSchemaTest, ASoundSchemaHasNoProblems) {

@@ -409,7 +409,7 @@ TEST_F(SchemaTest, SegmentsOfAllRigsAreReadFromTheIndexOfTheirList) {
       ASSERT_TRUE(after.ok()) << after.status();
       SqlCondition condition;
       const std::string sql =
-          SelectSegments("s.session", 0, query, {}, *after, 51, &condition);
+          SelectPlaces(0, query, {}, *after, 51, &condition);
       Statement plan(db->get(), "EXPLAIN QUERY PLAN " + sql);
       condition.Bind(&plan);
       std::vector<std::string> steps;
