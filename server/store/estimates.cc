@@ -3,10 +3,12 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_split.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "core/model/calibration.h"
 #include "server/status/status_macros.h"
@@ -47,12 +49,8 @@ absl::StatusOr<EstimatePlace> EstimatePlaceOf(const std::string& list,
 }
 
 // The condition that finds the rows after ?1, ?2 and ?3 in an index: of one
-// rig, of one component (?4), or of all.
+// component (?4), or of all.
 const char* ConditionOf(const EstimateQuery& query) {
-  if (!query.rigs.name.empty()) {
-    return "e.rig = ?1 AND (e.version, e.component) > (?2, ?3) "
-           "AND (?4 = '' OR e.component = ?4)";
-  }
   if (query.component.empty()) {
     return "(e.rig, e.version, e.component) > (?1, ?2, ?3) AND ?4 = ''";
   }
@@ -68,6 +66,100 @@ std::optional<double> IfFinite(double value) {
 std::optional<double> IfThere(const Statement& row, int column) {
   if (row.IsNull(column)) return std::nullopt;
   return row.Double(column);
+}
+
+struct FoundEstimate {
+  EstimatePlace place;
+  StoredEstimate estimate;
+};
+
+// Adds those that follow the place to *found, until it has `limit`: of these
+// rigs or, if none is named, of all.
+absl::Status ReadEstimates(Connection* db,
+                           const EstimateQuery& query,
+                           const std::vector<std::int64_t>& rigs,
+                           const EstimatePlace& place,
+                           std::size_t limit,
+                           std::vector<FoundEstimate>* found) {
+  Statement read(
+      db,
+      rigs.empty() ? Reuse::kKept : Reuse::kOnce,
+      fmt::format(
+          "SELECT r.id, e.version, c.create_time_ns, c.state, "
+          "  e.component, e.unit, e.value, e.sigma, e.from_factory, e.rig "
+          "FROM estimates e "
+          "JOIN calibrations c ON c.rig = e.rig AND c.version = e.version "
+          "JOIN rigs r ON r.rig = e.rig "
+          "WHERE {} AND {} {} "
+          "ORDER BY e.rig, e.version, e.component LIMIT ?5",
+          ConditionOf(query),
+          rigs.empty() ? "c.rig >= ?1 AND r.rig >= ?1"
+                       : fmt::format("e.rig IN ({0}) AND c.rig IN ({0})",
+                                     fmt::join(rigs, ", ")),
+          query.only_active ? "AND c.state = 1" : ""),
+      place.rig,
+      place.version,
+      place.component,
+      query.component,
+      static_cast<std::int64_t>(limit - found->size()));
+  while (read.Next()) {
+    found->push_back({{read.Int(9), read.Int(1), read.Text(4)},
+                      {read.Text(0),
+                       read.Int(1),
+                       read.Int(2),
+                       static_cast<CalibrationState>(read.Int(3)),
+                       read.Text(4),
+                       read.Text(5),
+                       read.Double(6),
+                       IfThere(read, 7),
+                       IfThere(read, 8)}});
+  }
+  return read.status();
+}
+
+// The keys of the first rigs of the query from this one on, ascending.
+absl::StatusOr<std::vector<std::int64_t>> RigsFrom(Connection* db,
+                                                   const RigQuery& query,
+                                                   std::int64_t first,
+                                                   int limit) {
+  SqlCondition condition(3);
+  AddRigConditions(query, "r", &condition, "?1");
+  Statement read(db,
+                 condition.reuse(),
+                 fmt::format("SELECT r.rig FROM rigs r WHERE r.rig >= ?1 AND "
+                             "{} ORDER BY r.rig LIMIT ?2",
+                             condition.sql()),
+                 first,
+                 limit);
+  condition.Bind(&read);
+  std::vector<std::int64_t> rigs;
+  while (read.Next()) rigs.push_back(read.Int(0));
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return rigs;
+}
+
+// The same for the rigs of the query: some at a time, each time twice as many.
+// In one statement, planners may read those of all rigs that are left, since
+// they do not know that conditions on the same key are of the same rigs.
+absl::Status ReadEstimatesOfSome(Connection* db,
+                                 const EstimateQuery& query,
+                                 const EstimatePlace& place,
+                                 std::size_t limit,
+                                 std::vector<FoundEstimate>* found) {
+  constexpr int kMostAtOnce = 5000;
+  int at_once = static_cast<int>(limit);
+  std::int64_t first = place.rig;
+  for (;;) {
+    SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::int64_t> rigs,
+                             RigsFrom(db, query.rigs, first, at_once));
+    if (rigs.empty()) return absl::OkStatus();
+    SELFCAL_RETURN_IF_ERROR(
+        ReadEstimates(db, query, rigs, place, limit, found));
+    const bool is_last = static_cast<int>(rigs.size()) < at_once;
+    if (is_last || found->size() >= limit) return absl::OkStatus();
+    first = rigs.back() + 1;
+    at_once = std::min(2 * at_once, kMostAtOnce);
+  }
 }
 
 }  // namespace
@@ -114,52 +206,27 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
   const std::string list = ListOf(query);
   SELFCAL_ASSIGN_OR_RETURN(EstimatePlace place, EstimatePlaceOf(list, page));
   const auto size = static_cast<std::size_t>(PageSize(page));
+  std::vector<FoundEstimate> found;
   if (!query.rigs.name.empty()) {
     SELFCAL_ASSIGN_OR_RETURN(place.rig, FindRigId(db, query.rigs.name));
   }
-  SqlCondition condition(6);
-  AddRigConditions(query.rigs, "r", &condition, "?1");
-  Statement read(
-      db,
-      condition.reuse(),
-      fmt::format("SELECT r.id, e.version, c.create_time_ns, c.state, "
-                  "  e.component, e.unit, e.value, e.sigma, e.from_factory, "
-                  "  e.rig "
-                  "FROM estimates e "
-                  "JOIN calibrations c ON c.rig = e.rig "
-                  "  AND c.version = e.version "
-                  "JOIN rigs r ON r.rig = e.rig "
-                  "WHERE {} AND c.rig >= ?1 AND r.rig >= ?1 AND {} {} "
-                  "ORDER BY e.rig, e.version, e.component LIMIT ?5",
-                  ConditionOf(query),
-                  condition.sql(),
-                  query.only_active ? "AND c.state = 1" : ""),
-      place.rig,
-      place.version,
-      place.component,
-      query.component,
-      static_cast<std::int64_t>(size + 1));
-  condition.Bind(&read);
+  SqlCondition some;
+  AddRigConditions(query.rigs, "r", &some);
+  SELFCAL_RETURN_IF_ERROR(
+      some.is_empty()
+          ? ReadEstimates(db, query, {}, place, size + 1, &found)
+          : ReadEstimatesOfSome(db, query, place, size + 1, &found));
   Listed<StoredEstimate> listed;
-  while (read.Next()) {
+  for (FoundEstimate& one : found) {
     if (listed.items.size() == size) {
       listed.next_token = MakePageToken(
           list,
           fmt::format("{} {} {}", place.rig, place.version, place.component));
       break;
     }
-    place = {read.Int(9), read.Int(1), read.Text(4)};
-    listed.items.push_back({read.Text(0),
-                            read.Int(1),
-                            read.Int(2),
-                            static_cast<CalibrationState>(read.Int(3)),
-                            read.Text(4),
-                            read.Text(5),
-                            read.Double(6),
-                            IfThere(read, 7),
-                            IfThere(read, 8)});
+    place = std::move(one.place);
+    listed.items.push_back(std::move(one.estimate));
   }
-  SELFCAL_RETURN_IF_ERROR(read.status());
   return listed;
 }
 

@@ -158,6 +158,32 @@ TEST_P(FleetListsTest, ParametersAreThoseOfTheVersion) {
   }
 }
 
+// Rigs of a label are read some at a time, until the page is full.
+TEST_P(FleetListsTest, ParametersThatFewRigsOfALabelHaveAreAllFound) {
+  for (int k = 0; k < 20; ++k) {
+    Rig rig = TestRig("rig" + std::to_string(k));
+    if (k % 6 == 0) rig.factory.cameras.push_back(rig.factory.cameras[0]);
+    ASSERT_TRUE(domain_->CreateRig(rig).ok());
+    SetLabel(rig.id, "model", k == 18 ? "t5" : "t4");
+  }
+  EstimateQuery query;
+  query.component = "cam1.focal.x";
+  query.rigs.labels = {{"model", "t4"}};
+  const auto all = [&] {
+    return Pages(
+        [&](const Page& page) { return store_->ListEstimates(query, page); },
+        [](const StoredEstimate& estimate) { return estimate.rig; });
+  };
+  EXPECT_THAT(all(), ::testing::UnorderedElementsAre("rig0", "rig6", "rig12"));
+  query.component = "";
+  EXPECT_THAT(all(),
+              SizeIs(16 * TangentSize(TestRig("a").factory) +
+                     3 * (TangentSize(TestRig("a").factory) +
+                          CameraTangentSize(TestRig("a").factory.cameras[0]))));
+  query.component = "cam2.focal.x";
+  EXPECT_THAT(all(), SizeIs(0));
+}
+
 TEST_P(FleetListsTest, ParametersOfNoRigAreNotFound) {
   EstimateQuery query;
   query.rigs.name = "nobody";
