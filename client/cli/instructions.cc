@@ -29,6 +29,14 @@ std::string StateText(v1::Instruction::State state) {
   }
 }
 
+std::string QuarantineText(const v1::QuarantineSegmentsRequest& request) {
+  const std::string which =
+      request.has_index()
+          ? fmt::format("segment {}~{}", request.session(), request.index())
+          : "segments of session " + request.session();
+  return fmt::format("quarantine {}: {}", which, request.reason());
+}
+
 std::string RequestText(const v1::Instruction& instruction) {
   switch (instruction.request_case()) {
     case v1::Instruction::kActivateCalibration:
@@ -42,9 +50,7 @@ std::string RequestText(const v1::Instruction& instruction) {
     case v1::Instruction::kStartRecalibration:
       return "recalibrate";
     case v1::Instruction::kQuarantineSegments:
-      return fmt::format("quarantine segments of session {}: {}",
-                         instruction.quarantine_segments().session(),
-                         instruction.quarantine_segments().reason());
+      return QuarantineText(instruction.quarantine_segments());
     case v1::Instruction::REQUEST_NOT_SET:
       break;
   }

@@ -97,6 +97,22 @@ struct CannedHub final : v1::RigService::Service,
     return grpc::Status::OK;
   }
 
+  grpc::Status ListInstructions(
+      grpc::ServerContext*,
+      const v1::ListInstructionsRequest* request,
+      v1::ListInstructionsResponse* response) override {
+    for (const int number : {1, 2}) {
+      v1::Instruction* one = response->add_instructions();
+      one->set_name(request->parent() + "/instructions/" +
+                    std::to_string(number));
+      v1::QuarantineSegmentsRequest* of = one->mutable_quarantine_segments();
+      of->set_session("walk");
+      of->set_reason("diverged");
+      if (number == 1) of->set_index(7);
+    }
+    return grpc::Status::OK;
+  }
+
   GrpcServer server{{static_cast<v1::RigService::Service*>(this),
                      static_cast<v1::FleetService::Service*>(this),
                      static_cast<v1::SegmentService::Service*>(this),
@@ -154,6 +170,15 @@ TEST_F(Instructions, AreGivenByTheCommandsThatChangeARig) {
   const auto start = GivenBy({"run", "start", "tablet", "--force"});
   EXPECT_EQ(start.start_recalibration().parent(), "rigs/tablet");
   EXPECT_TRUE(start.start_recalibration().force());
+}
+
+TEST_F(Instructions, AreListedWithTheSegmentsThatTheyConcern) {
+  const Outcome outcome = AtHub({"instruction", "list", "tablet"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(
+      outcome.out,
+      AllOf(HasSubstr("quarantine segment walk~7: diverged"),
+            HasSubstr("quarantine segments of session walk: diverged")));
 }
 
 TEST_F(Instructions, AreNotGivenForARigOfTheDaemonItself) {
