@@ -69,8 +69,7 @@ absl::StatusOr<SegmentInformation> InformationFromRow(
   return ParseInformationOf(rig, key, bytes);
 }
 
-// The rows of a page in the table with this name. Those of one rig are a list
-// of numbers, for which PostgreSQL can fetch all blocks at once.
+// The rows of a page in the table with this name.
 SqlCondition AreOnPage(const std::string& table,
                        const std::vector<SegmentPlace>& page) {
   SqlCondition condition;
@@ -97,22 +96,35 @@ SqlCondition AreOnPage(const std::string& table,
 // The segments of a page, by the keys of their rig and their sequence.
 using PageRows = std::map<std::pair<std::int64_t, std::int64_t>, StoredSegment>;
 
-// Calls `add` with the segment of each row that `select` finds for the page;
-// the first two columns are its keys.
-absl::Status AddToPage(
+// Calls `take` with each row that `select` finds for the page, and with its
+// keys, which are the first two columns.
+absl::Status ReadOnPage(
     Connection* db,
     const std::string& select,
     const std::string& table,
     const std::vector<SegmentPlace>& page,
-    PageRows* rows,
-    const std::function<absl::Status(const Statement&, StoredSegment*)>& add) {
+    const std::function<absl::Status(const PageRows::key_type&,
+                                     const Statement&)>& take) {
   const SqlCondition condition = AreOnPage(table, page);
   Statement read(db, Reuse::kOnce, select + " WHERE " + condition.sql());
   condition.Bind(&read);
   while (read.Next()) {
-    SELFCAL_RETURN_IF_ERROR(add(read, &(*rows)[{read.Int(0), read.Int(1)}]));
+    SELFCAL_RETURN_IF_ERROR(take({read.Int(0), read.Int(1)}, read));
   }
   return read.status();
+}
+
+absl::Status TakeInformation(const Statement& row, StoredSegment* segment) {
+  auto information =
+      InformationFromRow(segment->rig, segment->key, row.Text(2), row.Text(3));
+  const absl::Status& status = information.status();
+  if (absl::IsDataLoss(status)) {
+    segment->problem = std::string(status.message());
+    return absl::OkStatus();
+  }
+  SELFCAL_RETURN_IF_ERROR(status);
+  segment->information = *std::move(information);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<PageRows> ReadPageRows(Connection* db,
@@ -120,44 +132,36 @@ absl::StatusOr<PageRows> ReadPageRows(Connection* db,
   PageRows rows;
   if (page.empty()) return rows;
   SELFCAL_RETURN_IF_ERROR(
-      AddToPage(db,
-                fmt::format("SELECT {} FROM segments s", kSegmentColumns),
-                "s",
-                page,
-                &rows,
-                [](const Statement& row, StoredSegment* segment) {
-                  *segment = MetadataFromRow(row);
-                  return absl::OkStatus();
-                }));
+      ReadOnPage(db,
+                 fmt::format("SELECT {} FROM segments s", kSegmentColumns),
+                 "s",
+                 page,
+                 [&](const auto& key, const Statement& row) {
+                   rows.emplace(key, MetadataFromRow(row));
+                   return absl::OkStatus();
+                 }));
   SELFCAL_RETURN_IF_ERROR(
-      AddToPage(db,
-                "SELECT i.rig, i.sequence, i.information, i.sha256 "
-                "FROM segment_information i",
-                "i",
-                page,
-                &rows,
-                [](const Statement& row, StoredSegment* segment) {
-                  auto information = InformationFromRow(
-                      segment->rig, segment->key, row.Text(2), row.Text(3));
-                  const absl::Status& status = information.status();
-                  if (absl::IsDataLoss(status)) {
-                    segment->problem = std::string(status.message());
-                    return absl::OkStatus();
-                  }
-                  SELFCAL_RETURN_IF_ERROR(status);
-                  segment->information = *std::move(information);
-                  return absl::OkStatus();
-                }));
+      ReadOnPage(db,
+                 "SELECT i.rig, i.sequence, i.information, i.sha256 "
+                 "FROM segment_information i",
+                 "i",
+                 page,
+                 [&](const auto& key, const Statement& row) {
+                   const auto segment = rows.find(key);
+                   if (segment == rows.end()) return absl::OkStatus();
+                   return TakeInformation(row, &segment->second);
+                 }));
   SELFCAL_RETURN_IF_ERROR(
-      AddToPage(db,
-                "SELECT e.rig, e.sequence, e.group_name FROM table_entries e",
-                "e",
-                page,
-                &rows,
-                [](const Statement& row, StoredSegment* segment) {
-                  segment->tables.push_back(row.Text(2));
-                  return absl::OkStatus();
-                }));
+      ReadOnPage(db,
+                 "SELECT e.rig, e.sequence, e.group_name FROM table_entries e",
+                 "e",
+                 page,
+                 [&](const auto& key, const Statement& row) {
+                   const auto segment = rows.find(key);
+                   if (segment == rows.end()) return absl::OkStatus();
+                   segment->second.tables.push_back(row.Text(2));
+                   return absl::OkStatus();
+                 }));
   return rows;
 }
 
@@ -229,7 +233,9 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
   SELFCAL_RETURN_IF_ERROR(read.status());
   SELFCAL_ASSIGN_OR_RETURN(PageRows rows, ReadPageRows(db, places));
   for (const SegmentPlace& place : places) {
-    listed.items.push_back(std::move(rows.at({place.rig, place.sequence})));
+    // A damaged index names rows that do not exist.
+    const auto row = rows.find({place.rig, place.sequence});
+    if (row != rows.end()) listed.items.push_back(std::move(row->second));
   }
   return listed;
 }
