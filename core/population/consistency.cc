@@ -7,6 +7,7 @@
 #include "core/change/chi_square.h"
 #include "core/model/symmetric_eigen.h"
 #include "core/population/device.h"
+#include "core/population/weighted_chi_square.h"
 
 namespace selfcal {
 namespace {
@@ -57,15 +58,13 @@ CohortConsistency CompareWithCohort(const Cohort& cohort,
                                     const ThetaInformation& device) {
   const DevicePrediction prediction = PredictDevice(cohort);
   const Whitened whitened = Whiten(prediction, device);
+  const Eigen::ArrayXd& information = whitened.information;
   CohortConsistency result;
-  const Observed observed = SumObserved(whitened);
-  result.statistic = observed.statistic;
-  result.degrees = observed.degrees;
-  if (result.degrees == 0) return result;
-  result.probability = ChiSquareTail(result.statistic, result.degrees);
+  result.probability = WeightedChiSquareTail(
+      (whitened.e.array() / (information + 1)).square().sum(),
+      information / (information + 1));
 
   // Each component, given what the device knows of the others.
-  const Eigen::ArrayXd& information = whitened.information;
   const Eigen::MatrixXd posterior_gain =
       whitened.directions * (information + 1).inverse().matrix().asDiagonal();
   const Eigen::VectorXd difference = posterior_gain * whitened.e;

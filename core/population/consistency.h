@@ -20,11 +20,11 @@ struct CohortComponent {
 };
 
 struct CohortConsistency {
-  double statistic = 0;  // chi-square over the directions that are observed
-  int degrees = 0;
-  // Chance that a device of the cohort has a larger statistic, or a component
-  // that is less likely than the least likely one: the smaller one, for two
-  // tests.
+  // Chance that the estimate of a device of the cohort, with what its data
+  // knows and the cohort as its prior, is farther from the mean, or that it has
+  // a component that is less likely than the least likely one: the smaller one,
+  // for two tests. The distance counts each direction by the share of it that
+  // the data knows, so that many that are known a little count together.
   double probability = 1;
   // Components that the device knows at least as well as its cohort does, the
   // least likely first.

@@ -164,9 +164,26 @@ TEST(CompareWithCohort, HasNoDoubtsWithoutData) {
   const CohortConsistency found = CompareWithCohort(
       cohort,
       {Eigen::MatrixXd::Zero(kSize, kSize), Eigen::VectorXd::Zero(kSize)});
-  EXPECT_EQ(found.degrees, 0);
   EXPECT_EQ(found.probability, 1);
   EXPECT_THAT(found.components, IsEmpty());
+}
+
+// Each direction is known three times less than the cohort knows it.
+TEST(CompareWithCohort, ManyDirectionsThatAreKnownALittleCountTogether) {
+  RandomCohort truth(kSize, 0.3, 22);
+  const Cohort cohort = Estimate(truth.Devices(50));
+  const DevicePrediction prediction = PredictDevice(cohort);
+  const Eigen::MatrixXd Lambda = prediction.covariance.inverse() / 3;
+  const auto probability = [&](double spreads, double sign) {
+    const Eigen::VectorXd offset =
+        sign * spreads * truth.S.diagonal().cwiseSqrt();
+    return CompareWithCohort(cohort,
+                             {Lambda, Lambda * (prediction.mean + offset)})
+        .probability;
+  };
+  EXPECT_GT(probability(1, 1), 0.05);
+  EXPECT_LT(probability(5, 1), 0.01);
+  EXPECT_LT(probability(5, -1), 0.01);
 }
 
 TEST(CompareWithCohort, IsCalibratedForDevicesOfTheCohort) {

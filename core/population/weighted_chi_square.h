@@ -1,0 +1,15 @@
+// The distribution of a weighted sum of squares of independent standard normal
+// variables. Pure, callable from any thread.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace selfcal {
+
+// Probability that the sum is larger than `statistic`. Weights are at least 0;
+// without a positive one the probability is 1. An approximation by a saddle
+// point (Kuonen, Biometrika 86, 1999), whose relative error does not grow in
+// the tail: a tenth for a single square, a hundredth for ten.
+double WeightedChiSquareTail(double statistic, const Eigen::ArrayXd& weights);
+
+}  // namespace selfcal
