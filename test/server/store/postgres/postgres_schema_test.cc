@@ -44,6 +44,19 @@ class PostgresSchemaTest : public PostgresTest {
     return texts;
   }
 
+  // How the places of the first page of a rig are read.
+  std::string PlanOfFirstPage(const SegmentQuery& query) {
+    SqlCondition condition;
+    Statement plan(
+        db_.get(),
+        "EXPLAIN " + SelectPlaces(7, query, {}, std::nullopt, 51, &condition));
+    condition.Bind(&plan);
+    std::string steps;
+    while (plan.Next()) steps += plan.Text(0) + "\n";
+    EXPECT_TRUE(plan.status().ok()) << plan.status();
+    return steps;
+  }
+
   std::vector<std::string> Problems() {
     std::vector<std::string> problems;
     db_->CheckStructure([&](const StoreProblem& problem) {
@@ -181,15 +194,7 @@ TEST_F(PostgresSchemaTest, ExclusionsOfARigForARareCauseAreReadFromTheirIndex) {
                   .ok());
   SegmentQuery query;
   query.excluded = ExclusionCause::kDoesNotFit;
-  SqlCondition condition;
-  Statement plan(
-      db_.get(),
-      "EXPLAIN " + SelectPlaces(7, query, {}, std::nullopt, 51, &condition));
-  condition.Bind(&plan);
-  std::string steps;
-  while (plan.Next()) steps += plan.Text(0) + "\n";
-  EXPECT_TRUE(plan.status().ok()) << plan.status();
-  EXPECT_THAT(steps, HasSubstr("rare_absences_of_rig"));
+  EXPECT_THAT(PlanOfFirstPage(query), HasSubstr("rare_absences_of_rig"));
 }
 
 // The rows of a rig lie apart.
@@ -204,15 +209,7 @@ TEST_F(PostgresSchemaTest, APageOfARigIsFoundWithoutItsRows) {
                             Order::kAngularRate}) {
     SegmentQuery query;
     query.order = order;
-    SqlCondition condition;
-    Statement plan(
-        db_.get(),
-        "EXPLAIN " + SelectPlaces(7, query, {}, std::nullopt, 51, &condition));
-    condition.Bind(&plan);
-    std::string steps;
-    while (plan.Next()) steps += plan.Text(0) + "\n";
-    EXPECT_TRUE(plan.status().ok()) << plan.status();
-    EXPECT_THAT(steps, HasSubstr("Index Only Scan Backward"));
+    EXPECT_THAT(PlanOfFirstPage(query), HasSubstr("Index Only Scan Backward"));
   }
 }
 
