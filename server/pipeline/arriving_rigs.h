@@ -18,7 +18,7 @@ class ArrivingRigs {
   std::set<std::string> Take();
   // These could not be claimed: others hold them.
   void NoteForeign(const std::set<std::string>& rigs);
-  // With each beat: others may have given up what they held.
+  // Called with each beat: others may have given up what they held.
   void ForgetForeign();
 
  private:

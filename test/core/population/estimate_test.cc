@@ -186,8 +186,8 @@ TEST(CompareWithCohort, ManyDirectionsThatAreKnownALittleCountTogether) {
   EXPECT_LT(probability(5, -1), 0.01);
 }
 
-// How many of 400 devices, of ten cohorts, are unlikely at 5 % in their own
-// cohort, by data with this noise.
+// The number of devices, of 400 of ten cohorts, that are unlikely at 5 % in
+// their own cohort, by data with this noise.
 int Unlikely(double noise) {
   int unlikely = 0;
   constexpr int kNew = 40;

@@ -24,8 +24,8 @@ struct Bomb {
   int after_commit = 0;
   int iteration = 0;
 };
-inline Bomb
-    bomb;  // of the child, as what it counts over all threads of the store
+// Those of the child, which counts over all threads of the store.
+inline Bomb bomb;
 inline std::atomic<int> commits;
 inline std::atomic<int> committed;
 
@@ -96,8 +96,8 @@ inline CalibrationResult SolveOrDie(const Rig& rig,
   return result;
 }
 
-// Runs `live`, which exits, in a process of its own. Whether it was killed,
-// rather than having reached its end.
+// Runs `live`, which exits, in a process of its own. True if it was killed,
+// false if it reached its end.
 inline bool IsKilled(const std::function<void()>& live) {
   const pid_t child = fork();
   if (child == 0) live();

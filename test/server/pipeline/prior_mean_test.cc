@@ -120,6 +120,14 @@ std::vector<int> Components(const CohortDevice& device,
   return MatchComponents(TangentComponents(device.rig.factory), names);
 }
 
+// Two of its camera, which motion shows.
+std::vector<int> WrongComponents(const CohortDevice& device) {
+  std::vector<int> wrong =
+      Components(device, {"cam0.focal.x", "cam0.principal.x"});
+  EXPECT_EQ(wrong.size(), 2u);
+  return wrong;
+}
+
 std::vector<MotionSegment> SegmentsOf(const CohortDevice& device,
                                       const Trajectory& motion,
                                       std::uint64_t seed) {
@@ -282,9 +290,7 @@ TEST_F(PriorMeanTest, TheMeanOfItsCohortImprovesHardlyObservedComponents) {
 
 TEST_F(PriorMeanTest, AWrongMeanIsOverruledByTheData) {
   const CohortDevice device = DrawDevice(2);
-  const std::vector<int> wrong =
-      Components(device, {"cam0.focal.x", "cam0.principal.x"});
-  ASSERT_EQ(wrong.size(), 2u);
+  const std::vector<int> wrong = WrongComponents(device);
   StoredCalibration version;
   ASSERT_NO_FATAL_FAILURE(
       CalibrateOn(DescribedRig(device, WrongMean(device, wrong)),
@@ -304,9 +310,7 @@ TEST_F(PriorMeanTest, AWrongMeanIsOverruledByTheData) {
 
 TEST_F(PriorMeanTest, AWrongMeanGivesNoUnsoundVersionOfCalmMotion) {
   const CohortDevice device = DrawDevice(3);
-  const std::vector<int> wrong =
-      Components(device, {"cam0.focal.x", "cam0.principal.x"});
-  ASSERT_EQ(wrong.size(), 2u);
+  const std::vector<int> wrong = WrongComponents(device);
   StoredCalibration version;
   ASSERT_NO_FATAL_FAILURE(
       CalibrateOn(DescribedRig(device, WrongMean(device, wrong)),

@@ -138,8 +138,8 @@ TEST_P(RescoringKillTest, NoScoreOfARefusedCandidateStays) {
   // kill.
   const auto try_once = [&](Refusal refusal, const Bomb& planted) {
     const TempFolder folder;
-    // What the folder stands for is created here: the child has no part in the
-    // server of an engine that has one.
+    // The parent creates what the folder stands for: the child has no part in
+    // the server of an engine that has one.
     if (!GetParam().open(folder, 0).ok()) return false;
     const auto is_killed = [&](const Bomb& where) {
       return IsKilled([&] { Live(folder, refusal, where); });

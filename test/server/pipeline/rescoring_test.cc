@@ -19,6 +19,11 @@ using ::testing::IsEmpty;
 
 constexpr int kSegments = 3;
 
+absl::StatusOr<StoredRig> WithAnotherPrior(StoredRig stored) {
+  stored.rig.prior_sigmas.push_back({"imu.gyro.scale.*", 0.5});
+  return stored;
+}
+
 class RescoringTest : public PipelineTest {
  protected:
   RescoringTest() {
@@ -51,14 +56,7 @@ class RescoringTest : public PipelineTest {
   }
 
   void ChangePrior() {
-    const auto updated = pipeline_->UpdateRig(
-        "a",
-        [](StoredRig stored) -> absl::StatusOr<StoredRig> {
-          stored.rig.prior_sigmas.push_back({"imu.gyro.scale.*", 0.5});
-          return stored;
-        },
-        "eve",
-        "");
+    const auto updated = pipeline_->UpdateRig("a", WithAnotherPrior, "eve", "");
     ASSERT_TRUE(updated.ok()) << updated.status();
   }
 
@@ -247,14 +245,7 @@ TEST_F(RescoringOfRunTest, OthersWaitWhileARunScoresAtItsCandidate) {
 
 TEST_F(RescoringOfRunTest, AnUpdateDuringARunEndsWithAllScoresAtItsVersion) {
   on_second_at_candidate_ = [&] {
-    const auto updated = pipeline_->UpdateRig(
-        "a",
-        [](StoredRig stored) -> absl::StatusOr<StoredRig> {
-          stored.rig.prior_sigmas.push_back({"imu.gyro.scale.*", 0.5});
-          return stored;
-        },
-        "eve",
-        "");
+    const auto updated = pipeline_->UpdateRig("a", WithAnotherPrior, "eve", "");
     EXPECT_TRUE(updated.ok()) << updated.status();
     EXPECT_THAT(Entropies(), ElementsAre(AtCandidate(), AtFactory()));
   };

@@ -97,8 +97,8 @@ TEST_P(RunKillTest, OneRunForEachTriggerHoweverItIsKilled) {
   // kill.
   const auto try_once = [&](const Bomb& planted) {
     const TempFolder folder;
-    // What the folder stands for is created here: the child has no part in the
-    // server of an engine that has one.
+    // The parent creates what the folder stands for: the child has no part in
+    // the server of an engine that has one.
     if (!GetParam().open(folder, 0).ok()) return false;
     if (!LiveAndDie(folder, planted)) return false;
     EXPECT_FALSE(LiveAndDie(folder, {}));

@@ -44,7 +44,7 @@ class PostgresSchemaTest : public PostgresTest {
     return texts;
   }
 
-  // How the places of the first page of a rig are read.
+  // The plan that reads the places of the first page of a rig.
   std::string PlanOfFirstPage(const SegmentQuery& query) {
     SqlCondition condition;
     Statement plan(
